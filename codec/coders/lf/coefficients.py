@@ -259,7 +259,7 @@ def quantise(costs, coefficients, plane, shape, step, weight, levels, finer):
 class Trellis(NamedTuple):
     """Memory of `quantise_dependent`: the best path to each state."""
 
-    recent: Any  # (2, STATES, 3, LARGEST + 3) magnitudes on the last three diagonals by row, before and after a place
+    recent: Any  # (2, STATES, 3 · (LARGEST + 3)) magnitudes by row on the last three diagonals, before and after one
     totals: Any  # (2, STATES) cost, less that of no levels, in squared error
     bits: Any  # (2, STATES)
     levels: Any  # (STATES, n · n) magnitude chosen at a place,
@@ -269,7 +269,7 @@ class Trellis(NamedTuple):
 def new_trellis() -> Trellis:
     """Memory of `quantise_dependent`."""
     return Trellis(
-        recent=np.zeros((2, STATES, 3, LARGEST + 3), np.int32),
+        recent=np.zeros((2, STATES, 3 * (LARGEST + 3)), np.int16),
         totals=np.zeros((2, STATES), np.float32),
         bits=np.zeros((2, STATES), np.float32),
         levels=np.zeros((STATES, LARGEST * LARGEST), np.int32),
@@ -306,30 +306,35 @@ def _branch(costs, trellis, now, came, around, where, half, size, weight, finer)
 
 
 @stage_kernel
-def _clear_recent(recent, diagonal, count, n):
+def _clear_recent(recent, slot, reach):
+    """Forget one diagonal of each path, or all if there is no slot."""
     for state in range(STATES):
-        for i in range(diagonal, diagonal + count):
-            for j in range(n + 3):
-                recent[state, i % 3, j] = 0
+        row = recent[state]
+        for i in range(max(slot, 0), 3 * reach, 3 if slot >= 0 else 1):
+            row[np.uint64(i)] = 0
 
 
 @stage_kernel
-def _recent_sum(recent, diagonal, y):
+def _recent_sum(recent, slot, y):
     """Sum of the magnitudes that `_neighbourhood` adds, of a path."""
-    one, two = recent[(diagonal + 1) % 3], recent[(diagonal + 2) % 3]
-    return one[y] + one[y + 1] + two[y] + two[y + 1] + two[y + 2]
+    one, two = 3 * y + (slot + 1 if slot < 2 else 0), 3 * y + (slot + 2 if slot < 1 else slot - 1)
+    near = recent[np.uint64(one)] + recent[np.uint64(one + 3)]
+    return near + recent[np.uint64(two)] + recent[np.uint64(two + 3)] + recent[np.uint64(two + 6)]
 
 
 @stage_kernel
-def _follow(trellis, now, k, y, diagonal, n):
-    """Copy what contexts need to the paths that were extended by place k."""
+def _follow(trellis, now, k, y, slot, reach):
+    """Copy what contexts need to the paths that were extended by place k: diagonals to come have no further rows."""
     for to in range(STATES):
         came, new = np.int64(trellis.came[to, k]), trellis.recent[1 - now, to]
-        old = trellis.recent[now, max(came, 0)]
-        for i in range(3):
-            for j in range(n + 3):
-                new[i, j] = old[i, j] if came >= 0 else 0
-        new[diagonal % 3, y] = trellis.levels[to, k]
+        if came >= 0:
+            old = trellis.recent[now, came]
+            for i in range(3 * reach):
+                new[np.uint64(i)] = old[np.uint64(i)]
+        else:
+            for i in range(3 * reach):
+                new[np.uint64(i)] = 0
+        new[np.uint64(3 * y + slot)] = trellis.levels[to, k]
 
 
 @part_kernel
@@ -338,25 +343,26 @@ def quantise_dependent(costs, coefficients, plane, shape, step, weight, levels, 
     h, w = sides(shape)
     nothing, first = _none(coefficients, np.float32(NEVER) * step, levels, h, w)
     half = step * np.float32(HALF / 16)
-    now = diagonal = 0
+    now = diagonal = slot = reach = 0
     for came in range(STATES):
         trellis.totals[0, came] = HUGE
     for k in range(first, -1, -1):
         y, x = _scanned(shape, k)
         if k == first or y + x != diagonal:
-            diagonal = y + x
-            _clear_recent(trellis.recent[now], diagonal, 3 if k == first else 1, h)
+            diagonal, reach = y + x, min(h, y + x) + 3
+            slot = diagonal % 3
+            _clear_recent(trellis.recent[now], -1 if k == first else slot, reach)
         size = abs(np.float32(coefficients[np.uint64(y), np.uint64(x)]))
         where = k, _place(y, x), plane, shape
         for to in range(STATES):
             trellis.totals[1 - now, to], trellis.came[to, k], trellis.levels[to, k] = HUGE, -1, 0
         for came in range(STATES):
             if trellis.totals[now, came] < HUGE:
-                around = _class_of(_recent_sum(trellis.recent[now, came], diagonal, y))
+                around = _class_of(_recent_sum(trellis.recent[now, came], slot, y))
                 _branch(costs, trellis, now, came, around, where, half, size, weight, finer)
         if size > half:
             _branch(costs, trellis, now, np.int64(-1), 0, where, half, size, weight, finer)
-        _follow(trellis, now, k, y, diagonal, h)
+        _follow(trellis, now, k, y, slot, reach)
         now = 1 - now
     state: Any = np.int64(0)
     for other in range(1, STATES):

@@ -10,6 +10,7 @@ from .transform import LARGEST, sides, size_of
 
 FLAT, SMOOTH, DIRECTIONS = 0, 1, 34
 MODES = 2 + DIRECTIONS
+FROM_LEFT = 2 + DIRECTIONS // 2  # the first direction from the left
 # Eighths of a sample by the slope's magnitude and the place.
 BEYOND = np.array([[64 * (i + 1) // max(slope, 1) for i in range(LARGEST)] for slope in range(9)])
 # From version 9 on, by block size (4, 8, 16, 32): least slopes of directions that go on from a smoothed border. The
@@ -59,6 +60,33 @@ def fill_border(views, at, plane, blocks, done, y0, x0, shape, border, smoothed)
 
 
 @tuned_kernel
+def predict_along(border, mode, shape, square, smoothed):
+    """square[:h, :w] = the prediction by a direction; if that comes from the left, lying: rows are columns."""
+    from_left = mode >= FROM_LEFT
+    (h, w), log, fade = sides(shape), size_of(shape), (shape[0] + shape[1] - 2) >> 2
+    slope = (mode - 2) % (DIRECTIONS // 2) - 8
+    first = 2 if smoothed and abs(slope) >= LEAST_SLOPES[log - 2] else 0
+    side, other = border[first + (1 if from_left else 0)], border[first + (0 if from_left else 1)]
+    reach, length = (w, h) if from_left else (h, w)
+    for along in range(reach):  # the distance from the border
+        row, shift = square[along], (along + 1) * slope
+        across = 0
+        while across < length and 8 * (across + 1) + shift < 0:  # beyond the corner
+            at = max(0, 8 * (along + 1) - BEYOND[-slope, across])
+            i, eighths = at >> 3, at & 7
+            row[across] = (other[i] * (8 - eighths) + other[i + 1] * eighths + 4) >> 3
+            across += 1
+        start, part = 1 + (shift >> 3), np.int32(shift & 7)
+        rest = np.int32(8 - part)
+        for i in range(across, length):
+            one, two = side[np.uint64(start + i)], side[np.uint64(start + i + 1)]
+            both = np.int32(np.int32(one * rest) + np.int32(two * part))
+            row[np.uint64(i)] = np.int32(both + np.int32(4)) >> np.int32(3)
+    if smoothed and slope == 0:
+        _draw_straight(other, square, reach, length, fade)
+
+
+@tuned_kernel
 def predict_intra(border, mode, shape, out, plane, smoothed):
     """out[plane, :h, :w] = the prediction; from version 9 on, ``smoothed``."""
     square, (h, w), log = out[plane], sides(shape), size_of(shape)
@@ -85,28 +113,8 @@ def predict_intra(border, mode, shape, out, plane, smoothed):
                 both = np.int32(np.int32(level) << wide) + np.int32(slope << tall)
                 row[x] = np.int32(both + np.int32(1 << longer)) >> halvings
     else:
-        from_left = mode - 2 >= DIRECTIONS // 2
-        slope = (mode - 2) % (DIRECTIONS // 2) - 8
-        first = 2 if smoothed and abs(slope) >= LEAST_SLOPES[log - 2] else 0
-        side, other = border[first + (1 if from_left else 0)], border[first + (0 if from_left else 1)]
-        reach, length = (w, h) if from_left else (h, w)
-        for along in range(reach):  # the distance from the border
-            row, shift = square[along], (along + 1) * slope
-            across = 0
-            while across < length and 8 * (across + 1) + shift < 0:  # beyond the corner
-                at = max(0, 8 * (along + 1) - BEYOND[-slope, across])
-                i, eighths = at >> 3, at & 7
-                row[across] = (other[i] * (8 - eighths) + other[i + 1] * eighths + 4) >> 3
-                across += 1
-            start, part = 1 + (shift >> 3), np.int32(shift & 7)
-            rest = np.int32(8 - part)
-            for i in range(across, length):
-                one, two = side[np.uint64(start + i)], side[np.uint64(start + i + 1)]
-                both = np.int32(np.int32(one * rest) + np.int32(two * part))
-                row[np.uint64(i)] = np.int32(both + np.int32(4)) >> np.int32(3)
-        if smoothed and slope == 0:
-            _draw_straight(other, square, reach, length, fade)
-        if from_left:
+        predict_along(border, mode, shape, square, smoothed)
+        if mode >= FROM_LEFT:
             _transpose(square, max(h, w))
     if smoothed and mode <= SMOOTH:
         _draw_to_border(border, square, h, w, fade)

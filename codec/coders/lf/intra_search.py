@@ -7,27 +7,47 @@ import numpy as np
 from ii_core.base.jit import part_kernel, stage_kernel
 
 from .blocks import DONE, INTRA, kind_cost
-from .intra import DIRECTIONS, MODES, fill_border, predict_intra
+from .intra import DIRECTIONS, FROM_LEFT, MODES, fill_border, predict_along, predict_intra
 from .matching import HUGE
 from .transform import sides
 
 FIRST_DIRECTION = MODES - DIRECTIONS
 
 
+@stage_kernel
+def _magnitudes(own, y0, x0, predicted, h, w):
+    """Sum of the magnitudes of a difference."""
+    total = np.int32(0)
+    for y in range(h):
+        one, other = own[np.uint64(y0 + y)], predicted[y]
+        for x in range(w):
+            total += np.int32(abs(np.int32(np.int32(one[np.uint64(x0 + x)]) - other[x])))
+    return total
+
+
 @part_kernel
 def _add_magnitudes(search, work, y0, x0, shape, plane, modes, smoothed, errors):
-    """errors[mode] += sum of magnitudes of a plane's difference from the intra prediction."""
+    """errors[mode] += sum of magnitudes of a plane's difference from the intra prediction.
+
+    Predictions from the left stay lying, and are compared with a lying copy of the block.
+    """
     (h, w), (first, last, step) = sides(shape), modes
-    predicted = work.predicted[plane]
+    own, lying, predicted = search.original[plane], work.block, work.predicted[plane]
+    if last > FROM_LEFT:
+        for y in range(h):
+            for x in range(w):
+                lying[x, y] = own[np.uint64(y0 + y), np.uint64(x0 + x)]
     for mode in range(first, last, step):
         if mode < 0 or mode >= MODES:
             continue
-        predict_intra(work.border, mode, shape, work.predicted, plane, smoothed)
-        total = np.int32(0)
-        for y in range(h):
-            own, row = search.original[plane, np.uint64(y0 + y)], predicted[y]
-            for x in range(w):
-                total += np.int32(abs(np.int32(np.int32(own[np.uint64(x0 + x)]) - row[x])))
+        if mode < FIRST_DIRECTION:
+            predict_intra(work.border, mode, shape, work.predicted, plane, smoothed)
+        else:
+            predict_along(work.border, mode, shape, predicted, smoothed)
+        if mode < FROM_LEFT:
+            total = _magnitudes(own, y0, x0, predicted, h, w)
+        else:
+            total = _magnitudes(lying, 0, 0, predicted, w, h)
         errors[mode] += np.float32(total)  # exact: 1024 differences of decoded samples stay below 2^24
 
 
@@ -50,7 +70,8 @@ def rank_directions(costs, job, search, work, y0, x0, shape, errors):
     weight = np.float32(np.sqrt(search.weight))
     for mode in range(MODES):
         if errors[mode] < HUGE:
-            errors[mode] += weight * kind_cost(costs, job, by, bx, shape, INTRA, 0, 0, mode)
+            side = kind_cost(costs, job, by, bx, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode)
+            errors[mode] += weight * side
 
 
 @part_kernel

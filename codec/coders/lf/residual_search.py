@@ -20,6 +20,7 @@ from .transform import LARGEST, forward, sides, size_of
 
 BEST = 2
 FIRST_BITS, OCTAVE_BITS = 4.5, 1.6  # of a coefficient of one step, and for each doubling, about
+ONE = np.int64(1)  # a literal number would compile a kernel of its own
 WORTH_SKIPPING = np.float32(1.2)  # times the least cost so far: beyond it, skipping the transform is not tried
 
 
@@ -130,7 +131,7 @@ def try_residual(costs, job, search, work, trial, y0, x0, shape, kind, so_far):
     ``so_far`` is the least cost of the block: far above it, skipping the transform is not tried.
     """
     trial.trial_skipped[0] = 0
-    bits, error, coded = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, 0, HUGE)
+    bits, error, coded = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, np.int64(0), HUGE)
     cost = error + search.weight * bits
     if not coded or not job.skipping or shape[0] + shape[1] > LARGEST_SKIPPED or cost > WORTH_SKIPPING * so_far:
         return bits, error, coded
@@ -144,7 +145,7 @@ def try_residual(costs, job, search, work, trial, y0, x0, shape, kind, so_far):
         trial.cross[1],
         shape,
     )
-    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, 1, cost)
+    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, np.int64(1), cost)
     if some and missed + search.weight * more < cost:
         trial.trial_skipped[0] = 1
         return more, missed, some
@@ -186,7 +187,7 @@ def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limi
             trial.trial_cross[p - 1] = cross
         if some:
             levels = work.spare if cross else work.levels
-            rows, cols = rebuild(work, levels, shape, job.step, 1, cross, job.crossed, skipped, job.dependent)
+            rows, cols = rebuild(work, levels, shape, job.step, ONE, cross, job.crossed, skipped, job.dependent)
             if p == 0:
                 keep_first(work, rows, cols)
                 first = 1

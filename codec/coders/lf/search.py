@@ -347,7 +347,7 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, dep
         elif depth >= search.halvings or not (ways >> (way - 1)) & 1:
             continue
         if latest:
-            _copy_region(job, kept, y0, x0, shape, 0)
+            _copy_region(job, kept, y0, x0, shape, np.int64(0))
         _forget(job, y0, x0, shape)
         if way == 3:
             total = search.weight * bit_cost(costs, split_context(job, by, bx, log), 1)
@@ -371,7 +371,7 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, dep
             if way == 3 and _split_further(job.blocks, by, bx, log) >= MANY_SPLIT:
                 break
     if not latest:
-        _copy_region(job, kept, y0, x0, shape, 1)
+        _copy_region(job, kept, y0, x0, shape, np.int64(1))
     return best
 
 
