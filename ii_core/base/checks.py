@@ -67,8 +67,8 @@ def instance(*kinds: type) -> Rule:
 
 
 def path(name: str, value: Any) -> None:
-    """Rule: text, or a path object."""
-    if not isinstance(value, str | os.PathLike) or "\0" in os.fspath(value):
+    """Rule: text that is not empty, which would be the working folder, or a path object."""
+    if not isinstance(value, str | os.PathLike) or "\0" in os.fspath(value) or value == "":
         raise refuse(name, value, "a path")
 
 

@@ -110,7 +110,7 @@ def _depths(depth: NDArray[Any], inverse: float | None) -> Floats:
             raise ValueError(f"inverse is {inverse}: a finite number above 1 is needed")
         known = np.isfinite(z)
         if not known.any() or np.ptp(z[known]) == 0:
-            raise ValueError("the map of 1/z holds one value: at least two are needed")
+            raise ValueError("depth holds one value: as 1/z, with inverse, at least two are needed")
         low, high = z[known].min(), z[known].max()
         z = 1 / (1 / inverse + (1 - 1 / inverse) * (z - low) / (high - low))
     known = z > 0

@@ -110,7 +110,7 @@ def test_large_maps_are_thinned():
         ({"depth": np.ones(6)}, r"depth has the shape \(6,\)"),
         ({"depth": np.zeros((4, 6))}, "known nowhere"),
         ({"depth": -np.ones((4, 6))}, "negative somewhere"),
-        ({"inverse": 2.0}, "holds one value"),
+        ({"inverse": 2.0}, "depth holds one value: as 1/z, with inverse"),
         ({"inverse": 1.0, "depth": np.eye(4, 6)}, "inverse is 1.0"),
         ({"field_deg": 180.0}, "field_deg is 180"),
         ({"cut": 0.0}, "cut is 0"),
