@@ -187,14 +187,16 @@ def _fused(a: Any, b: Any, c: Any) -> Any:
     return lambda a, b, c: _multiply_add(a, b, c)
 
 
-@intrinsic
-def _multiply_add(typing: Any, a: Any, b: Any, c: Any) -> Any:
+def _multiply_add_code(typing: Any, a: Any, b: Any, c: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         real = values[0].type
         function = builder.module.declare_intrinsic("llvm.fmuladd", [real], ir.FunctionType(real, [real] * 3))
         return builder.call(function, values)
 
     return a(a, a, a), generate
+
+
+_multiply_add: Any = intrinsic(_multiply_add_code)
 
 
 class _Fragment(JITCodeLibrary):

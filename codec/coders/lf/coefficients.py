@@ -287,7 +287,7 @@ def _candidates(exact, square, odd):
 
     Errors are in squared halves and less that of zero, ``square``.
     """
-    low = min(np.int64((exact + odd) * np.float32(0.5)), MOST_LEVEL // 2 - 1)
+    low: Any = min(np.int64((exact + odd) * np.float32(0.5)), MOST_LEVEL // 2 - 1)
     even, uneven = (low + 1, low) if low & 1 else (low, low + 1)
     missed = exact - (np.float32(2 * even) - odd if even else np.float32(0))
     other = exact - (np.float32(2 * uneven) - odd)
