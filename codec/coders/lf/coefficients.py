@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import part_kernel, stage_kernel, tuned_kernel
+from ii_core.base.jit import fused, part_kernel, stage_kernel, tuned_kernel
 
 from .arithmetic import bit_cost, code_bit, code_mixed, code_number, code_raw, number_cost
 from .contexts import (
@@ -158,20 +158,26 @@ def code_coefficients(coder, levels, plane, shape, intra, finer, dependent):
 
 
 @stage_kernel
-def _level_cost(costs, size, around, place, plane, log, last, finer, state):
-    bits, near = np.float32(0), min(around, 7)
-    if not last:
-        bits += bit_cost(costs, _significant_context(plane, log, place, near, state), 1 if size else 0)
-        if size == 0:
-            return bits
+def _size_cost(costs, bits, size, around, place, plane, finer, state):
+    """``bits``, and those of a magnitude that is known not to be zero, with its sign."""
     bits += np.float32(1)
-    context = (plane * 8 + near) * 2 + (1 if place == 0 else 0)
+    context = (plane * 8 + min(around, 7)) * 2 + (1 if place == 0 else 0)
     bits += bit_cost(costs, _above_one_context(context, state), 1 if size > 1 else 0)
     if size > 1:
         bits += bit_cost(costs, ABOVE_TWO + context, 1 if size > 2 else 0)
         if size > 2:
             bits += number_cost(costs, _rest_context(plane, around, finer), np.int64(16), np.int64(0), size - 3)
     return bits
+
+
+@stage_kernel
+def _level_cost(costs, size, around, place, plane, log, last, finer, state):
+    bits = np.float32(0)
+    if not last:
+        bits += bit_cost(costs, _significant_context(plane, log, place, min(around, 7), state), 1 if size else 0)
+        if size == 0:
+            return bits
+    return _size_cost(costs, bits, size, around, place, plane, finer, state)
 
 
 @stage_kernel
@@ -259,82 +265,169 @@ def quantise(costs, coefficients, plane, shape, step, weight, levels, finer):
 class Trellis(NamedTuple):
     """Memory of `quantise_dependent`: the best path to each state."""
 
-    recent: Any  # (2, STATES, 3 · (LARGEST + 3)) magnitudes by row on the last three diagonals, before and after one
-    totals: Any  # (2, STATES) cost, less that of no levels, in squared error
-    bits: Any  # (2, STATES)
-    levels: Any  # (STATES, n · n) magnitude chosen at a place,
+    levels: Any  # (n · n, STATES) magnitude chosen at a place,
     came: Any  # and the state before; -1 where the path begins
+    sizes: Any  # (2, STATES + 1, n + 5) magnitudes by row on the last two diagonals, after and before two zeros,
+    around: Any  # (STATES + 1, n) and classes of their sums by row of the next; the last state's are zeros
 
 
 def new_trellis() -> Trellis:
     """Memory of `quantise_dependent`."""
     return Trellis(
-        recent=np.zeros((2, STATES, 3 * (LARGEST + 3)), np.int16),
-        totals=np.zeros((2, STATES), np.float32),
-        bits=np.zeros((2, STATES), np.float32),
-        levels=np.zeros((STATES, LARGEST * LARGEST), np.int32),
-        came=np.zeros((STATES, LARGEST * LARGEST), np.int8),
+        levels=np.zeros((LARGEST * LARGEST, STATES), np.int32),
+        came=np.zeros((LARGEST * LARGEST, STATES), np.int32),
+        sizes=np.zeros((2, STATES + 1, LARGEST + 5), np.int32),
+        around=np.zeros((STATES + 1, LARGEST), np.int64),
     )
 
 
 @stage_kernel
-def _branch(costs, trellis, now, came, around, where, half, size, weight, finer):
-    """Extend the path to a state, or begin one if it is -1, by the levels next to a coefficient; keep the better."""
-    k, place, plane, shape = where
-    log = size_of(shape)
-    first = came < 0
-    state: Any = max(came, 0)
-    odd = np.float32(state >> 1)
-    if first:
-        bits = number_cost(costs, _last_context(plane, shape), np.int64(12), np.int64(0), k)
-        total = weight * bits
-    else:
-        total, bits = trellis.totals[now, state], trellis.bits[now, state]
-    exact = size / half
+def _candidates(exact, square, odd):
+    """Levels next to a coefficient in halves, an even and an odd one, their errors, and whether zero is another.
+
+    Errors are in squared halves and less that of zero, ``square``.
+    """
     low: Any = min(np.int64((exact + odd) * np.float32(0.5)), MOST_LEVEL // 2 - 1)
-    for tried in range(2 if low > 2 or low == 0 else 3):  # the nearest two, and zero
-        level: Any = low + tried if tried < 2 else np.int64(0)
-        if level == 0 and first:
-            continue
-        missed = exact - (np.float32(2 * level) - odd if level else np.float32(0))
-        more = _level_cost(costs, level, around, place, plane, log, first, finer, state)
-        cost = total + half * half * (missed * missed - exact * exact) + weight * more
-        to = NEXT[state, level & 1]
-        if cost < trellis.totals[1 - now, to]:
-            trellis.totals[1 - now, to], trellis.bits[1 - now, to] = cost, bits + more
-            trellis.levels[to, k], trellis.came[to, k] = level, came
+    even, uneven = (low + 1, low) if low & 1 else (low, low + 1)
+    missed = exact - (np.float32(2 * even) - odd if even else np.float32(0))
+    other = exact - (np.float32(2 * uneven) - odd)
+    return even, uneven, fused(missed, missed, -square), fused(other, other, -square), low == 1 or low == 2
 
 
 @stage_kernel
-def _clear_recent(recent, slot, reach):
-    """Forget one diagonal of each path, or all if there is no slot."""
+def _branches(costs, path, state, near, where, sizes, candidates):
+    """Extend the path to a state by an even level and by an odd one: twice cost, bits, level and state."""
+    (total, bits, entered), (place, plane, log, finer) = path, where
+    around = near[1][np.uint64(entered), np.uint64(near[0])]
+    even, uneven, error, other_error, zero = candidates
+    square, weight, nothing = sizes
+    context = _significant_context(plane, log, place, min(around, 7), state)
+    none, some = bit_cost(costs, context, 0), bit_cost(costs, context, 1)
+    more = _size_cost(costs, some, even, around, place, plane, finer, state) if even else none
+    cost = fused(weight, more, fused(square, error, total))
+    if zero:
+        least = fused(weight, none, fused(square, nothing, total))
+        if least < cost:
+            cost, more, even = least, none, np.int64(0)
+    other = _size_cost(costs, some, uneven, around, place, plane, finer, state)
+    other_cost = fused(weight, other, fused(square, other_error, total))
+    return (cost, bits + more, even, state), (other_cost, bits + other, uneven, state)
+
+
+@stage_kernel
+def _beginnings(costs, k, shape, where, sizes, candidates):
+    """As `_branches`, of a path that begins; both of its levels are coded."""
+    place, plane, _, finer = where
+    even, uneven, error, other_error, _ = candidates
+    square, weight, _ = sizes
+    bits = number_cost(costs, _last_context(plane, shape), np.int64(12), np.int64(0), k)
+    total = weight * bits
+    more = _size_cost(costs, np.float32(0), even, 0, place, plane, finer, 0)
+    other = _size_cost(costs, np.float32(0), uneven, 0, place, plane, finer, 0)
+    cost = fused(weight, more, fused(square, error, total)) if even else HUGE
+    other_cost = fused(weight, other, fused(square, other_error, total))
+    return (cost, bits + more, even, np.int64(-1)), (other_cost, bits + other, uneven, np.int64(-1))
+
+
+@stage_kernel
+def _cheaper(one, other):
+    return other if other[0] < one[0] else one
+
+
+@stage_kernel
+def _arrive(trellis, k, to, found, paths):
+    """Note the best branch to a state; return the path's cost, its bits, and its state before this diagonal."""
+    cost, bits, level, came = found
+    trellis.levels[np.uint64(k), np.uint64(to)], trellis.came[np.uint64(k), np.uint64(to)] = level, came
+    entered = paths[0][2]
+    if came == 1:
+        entered = paths[1][2]
+    elif came == 2:
+        entered = paths[2][2]
+    elif came == 3:
+        entered = paths[3][2]
+    elif came < 0:
+        entered = np.int64(STATES)
+    return cost, bits, entered
+
+
+@stage_kernel
+def _end_diagonal(trellis, now, first, end, diagonal, shape, entered):
+    """Note the paths' magnitudes on a diagonal, of places first … end - 1, and their classes around the next."""
+    h, w = sides(shape)
+    low, high = max(diagonal - w + 1, 0), min(diagonal, h - 1)
     for state in range(STATES):
-        row = recent[state]
-        for i in range(max(slot, 0), 3 * reach, 3 if slot >= 0 else 1):
-            row[np.uint64(i)] = 0
+        sizes, before = trellis.sizes[now, state], trellis.sizes[1 - now, entered[state]]
+        for y in range(low, high + 5):  # two zeros before and after
+            sizes[np.uint64(y)] = 0
+        at = np.int64(state)
+        for k in range(first, end):
+            y, _ = _scanned(shape, k)
+            sizes[np.uint64(y + 2)] = trellis.levels[np.uint64(k), np.uint64(at)]
+            at = np.int64(trellis.came[np.uint64(k), np.uint64(at)])
+            if at < 0:
+                break
+        around = trellis.around[state]
+        for y in range(max(low - 1, 0), min(diagonal, h)):
+            near, far = sizes[np.uint64(y + 2)] + sizes[np.uint64(y + 3)], before[np.uint64(y + 2)]
+            far += before[np.uint64(y + 3)] + before[np.uint64(y + 4)]
+            around[np.uint64(y)] = _class_of(near + far)
 
 
 @stage_kernel
-def _recent_sum(recent, slot, y):
-    """Sum of the magnitudes that `_neighbourhood` adds, of a path."""
-    one, two = 3 * y + (slot + 1 if slot < 2 else 0), 3 * y + (slot + 2 if slot < 1 else slot - 1)
-    near = recent[np.uint64(one)] + recent[np.uint64(one + 3)]
-    return near + recent[np.uint64(two)] + recent[np.uint64(two + 3)] + recent[np.uint64(two + 6)]
+def _inside(path, state):
+    """A path to a state, which enters the next diagonal."""
+    return path[0], path[1], np.int64(state)
 
 
 @stage_kernel
-def _follow(trellis, now, k, y, slot, reach):
-    """Copy what contexts need to the paths that were extended by place k: diagonals to come have no further rows."""
-    for to in range(STATES):
-        came, new = np.int64(trellis.came[to, k]), trellis.recent[1 - now, to]
-        if came >= 0:
-            old = trellis.recent[now, came]
-            for i in range(3 * reach):
-                new[np.uint64(i)] = old[np.uint64(i)]
-        else:
-            for i in range(3 * reach):
-                new[np.uint64(i)] = 0
-        new[np.uint64(3 * y + slot)] = trellis.levels[to, k]
+def _arrivals(costs, paths, near, where, k, shape, size, half, weight):
+    """The best branches by the k-th place to each of the states: cost, bits, level and state before."""
+    exact = size / half
+    square = exact * exact
+    sizes = half * half, weight, fused(exact, exact, -square)
+    even, odd = _candidates(exact, square, np.float32(0)), _candidates(exact, square, np.float32(1))
+    from_0 = _branches(costs, paths[0], np.int64(0), near, where, sizes, even)
+    from_1 = _branches(costs, paths[1], np.int64(1), near, where, sizes, even)
+    from_2 = _branches(costs, paths[2], np.int64(2), near, where, sizes, odd)
+    from_3 = _branches(costs, paths[3], np.int64(3), near, where, sizes, odd)
+    to_0, to_2 = _cheaper(from_0[0], from_1[1]), _cheaper(from_0[1], from_1[0])
+    to_1, to_3 = _cheaper(from_2[0], from_3[1]), _cheaper(from_2[1], from_3[0])
+    if size > half:
+        begun = _beginnings(costs, k, shape, where, sizes, even)
+        to_0, to_2 = _cheaper(to_0, begun[0]), _cheaper(to_2, begun[1])
+    return to_0, to_1, to_2, to_3
+
+
+@stage_kernel
+def _best_path(costs, coefficients, first, plane, shape, step, weight, finer, trellis):
+    """Fill the trellis from the first place on; return the last state of the best path, its cost and its bits.
+
+    Paths are by state: cost, less that of no levels, in squared error, bits, and state before the diagonal.
+    """
+    half = step * np.float32(HALF / 16)
+    y, x = _scanned(shape, first)
+    diagonal, end, now = y + x, first + 1, 0
+    never = HUGE, np.float32(0), np.int64(STATES)
+    paths = never, never, never, never
+    for k in range(first, -1, -1):
+        y, x = _scanned(shape, k)
+        if y + x != diagonal:
+            entered = paths[0][2], paths[1][2], paths[2][2], paths[3][2]
+            _end_diagonal(trellis, now, k + 1, end, diagonal, shape, entered)
+            diagonal, end, now = y + x, k + 1, 1 - now
+            paths = _inside(paths[0], 0), _inside(paths[1], 1), _inside(paths[2], 2), _inside(paths[3], 3)
+        size = abs(np.float32(coefficients[np.uint64(y), np.uint64(x)]))
+        where, near = (_place(y, x), plane, size_of(shape), finer), (y, trellis.around)
+        to = _arrivals(costs, paths, near, where, k, shape, size, half, weight)
+        to_0, to_1 = _arrive(trellis, k, 0, to[0], paths), _arrive(trellis, k, 1, to[1], paths)
+        to_2, to_3 = _arrive(trellis, k, 2, to[2], paths), _arrive(trellis, k, 3, to[3], paths)
+        paths = to_0, to_1, to_2, to_3
+    state, best = np.int64(0), paths[0]
+    for other in range(1, STATES):
+        if paths[other][0] < best[0]:
+            state, best = np.int64(other), paths[other]
+    return state, best[0], best[1]
 
 
 @part_kernel
@@ -342,38 +435,14 @@ def quantise_dependent(costs, coefficients, plane, shape, step, weight, levels, 
     """As `quantise`, by a dependent quantiser: the path of least cost through its states (Viterbi)."""
     h, w = sides(shape)
     nothing, first = _none(coefficients, np.float32(NEVER) * step, levels, h, w)
-    half = step * np.float32(HALF / 16)
-    now = diagonal = slot = reach = 0
-    for came in range(STATES):
-        trellis.totals[0, came] = HUGE
-    for k in range(first, -1, -1):
-        y, x = _scanned(shape, k)
-        if k == first or y + x != diagonal:
-            diagonal, reach = y + x, min(h, y + x) + 3
-            slot = diagonal % 3
-            _clear_recent(trellis.recent[now], -1 if k == first else slot, reach)
-        size = abs(np.float32(coefficients[np.uint64(y), np.uint64(x)]))
-        where = k, _place(y, x), plane, shape
-        for to in range(STATES):
-            trellis.totals[1 - now, to], trellis.came[to, k], trellis.levels[to, k] = HUGE, -1, 0
-        for came in range(STATES):
-            if trellis.totals[now, came] < HUGE:
-                around = _class_of(_recent_sum(trellis.recent[now, came], slot, y))
-                _branch(costs, trellis, now, came, around, where, half, size, weight, finer)
-        if size > half:
-            _branch(costs, trellis, now, np.int64(-1), 0, where, half, size, weight, finer)
-        _follow(trellis, now, k, y, slot, reach)
-        now = 1 - now
-    state: Any = np.int64(0)
-    for other in range(1, STATES):
-        if trellis.totals[now, other] < trellis.totals[now, state]:
-            state = np.int64(other)
-    least, bits = trellis.totals[now, state], trellis.bits[now, state]
+    if first < 0:
+        return np.float32(0), nothing
+    state, least, bits = _best_path(costs, coefficients, first, plane, shape, step, weight, finer, trellis)
     if least >= 0:
         return np.float32(0), nothing
     for k in range(first + 1):
-        level: Any = np.int64(trellis.levels[state, k])
-        before: Any = np.int64(trellis.came[state, k])
+        level: Any = np.int64(trellis.levels[k, state])
+        before: Any = np.int64(trellis.came[k, state])
         if level:
             y, x = _scanned(shape, k)
             level = 2 * level - (max(before, 0) >> 1)

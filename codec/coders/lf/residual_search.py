@@ -14,13 +14,14 @@ from .blocks import FIELDS, INTRA, LIMIT, coded_context, residual_context, skipp
 from .coefficients import Trellis, new_trellis, quantise, quantise_dependent
 from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
 from .intra import MODES
-from .matching import HUGE
 from .samples import LARGEST_SKIPPED, quantise_samples
 from .transform import LARGEST, forward, sides, size_of
 
 BEST = 2
 FIRST_BITS, OCTAVE_BITS = 4.5, 1.6  # of a coefficient of one step, and for each doubling, about
 ONE = np.int64(1)  # a literal number would compile a kernel of its own
+NOTHING = np.float32(0)
+BEYOND = np.float32(1.00001)  # times the least cost so far: more by far than sums of the same terms are rounded
 WORTH_SKIPPING = np.float32(1.2)  # times the least cost so far: beyond it, skipping the transform is not tried
 
 
@@ -128,12 +129,16 @@ def _try_plane(costs, work, trial, plane, shape, step, weight, kind, first, cros
 def try_residual(costs, job, search, work, trial, y0, x0, shape, kind, so_far):
     """Code the difference to work.predicted; return bits, error and whether there is a residual.
 
-    ``so_far`` is the least cost of the block: far above it, skipping the transform is not tried.
+    ``so_far`` is the least cost of the block: far above it, skipping the transform is not tried. The way is left when
+    its first planes cost more than that, and those of a block without a residual, too.
     """
     trial.trial_skipped[0] = 0
-    bits, error, coded = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, np.int64(0), HUGE)
+    small = job.skipping and shape[0] + shape[1] <= LARGEST_SKIPPED
+    useless = BEYOND * so_far
+    limit = WORTH_SKIPPING * useless if small else useless
+    bits, error, coded = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, np.int64(0), limit, useless)
     cost = error + search.weight * bits
-    if not coded or not job.skipping or shape[0] + shape[1] > LARGEST_SKIPPED or cost > WORTH_SKIPPING * so_far:
+    if not coded or not small or cost > WORTH_SKIPPING * so_far:
         return bits, error, coded
     trial.cross[1, 0], trial.cross[1, 1] = trial.trial_cross[0], trial.trial_cross[1]
     copy_trial(
@@ -145,7 +150,8 @@ def try_residual(costs, job, search, work, trial, y0, x0, shape, kind, so_far):
         trial.cross[1],
         shape,
     )
-    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, np.int64(1), cost)
+    limit = min(cost, useless)
+    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, ONE, limit, NOTHING)
     if some and missed + search.weight * more < cost:
         trial.trial_skipped[0] = 1
         return more, missed, some
@@ -165,17 +171,22 @@ def try_residual(costs, job, search, work, trial, y0, x0, shape, kind, so_far):
 def try_transform(costs, job, search, work, trial, y0, x0, shape, kind, limit):
     """As `try_residual` of an intra block, by a kind of transform; give up without a residual beyond a cost."""
     trial.trial_skipped[0] = 2 * kind
-    return _try_way(costs, job, search, work, trial, y0, x0, shape, np.int64(INTRA), 2 * kind, limit)
+    return _try_way(costs, job, search, work, trial, y0, x0, shape, np.int64(INTRA), 2 * kind, limit, NOTHING)
 
 
 @part_kernel
-def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limit):
-    """As `try_residual`, without a transform or by twice its kind; give up without a residual beyond a cost."""
+def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limit, useless):
+    """As `try_residual`, without a transform or by twice its kind; give up beyond a cost.
+
+    Not if the block without a residual costs less than another one.
+    """
     by, bx = y0 >> 2, x0 >> 2
     step = np.float32(job.step / 16)
     bits, error, without = np.float32(0), np.float32(0), np.float32(0)
     first, coded = 0, 0
     ways = job.finer, job.dependent
+    context = residual_context(job, by, bx, shape, kind)
+    empty = bit_cost(costs, context, np.int64(0))
     for p in range(3):
         least = _subtract_prediction(search, work, p, y0, x0, shape)
         without += least
@@ -198,9 +209,12 @@ def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limi
             _leave(trial, work, p, shape)
             error += least
         if error + search.weight * bits > limit:
-            return bits, error, 0
-    context = residual_context(job, by, bx, shape, kind)
-    empty = bit_cost(costs, context, np.int64(0))
+            least = without + search.weight * empty
+            for other in range(p + 1, 3):
+                if least <= useless:
+                    least += _subtract_prediction(search, work, other, y0, x0, shape)
+            if least > useless:
+                return bits, error, 0
     if coded:
         bits += bit_cost(costs, context, 1)
         if job.skipping and shape[0] + shape[1] <= LARGEST_SKIPPED:
