@@ -30,13 +30,15 @@ from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
 
 ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
-# Numbers of samples of pixels that are no cells.
-SETS = np.array([2, 3, 4, 6, 9, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 256])
-SETS_ENDS = np.sqrt(SETS[:-1] * SETS[1:])
+# Numbers of samples of pixels that are no cells. Others above 16 miss more of an edge than these in turn.
+SETS = np.array([2, 3, 4, 6, 9, 12, 16, 32, 64, 128, 256])
+GOLDEN = (5**0.5 - 1) / 2  # multiples of it share pixels out evenly
+CALM = 0.25  # the step at which a pixel of such a tile gets a set, in parts of that elsewhere
 DENSE = 0.3  # share of the pixels, around which much meets, from which on no edges are looked for
 LOOSE = 2.0  # how much more than the error wanted of all pixels may be hidden in one
 SPREAD, SPREAD_ERROR = 0.3, 0.75  # powers of the roughness by which samples of a pixel and their error grow
 PILOTS, OF_PILOTS = 768, (4, 9)  # pixels of a tile that get two sets, which tell of the error
+PILOTS_FILTER = 0.6  # times the width of a set's filter: what it errs alike in all sets, scatters instead
 ALIKE = 0.8  # square of the difference of both in parts of the sum of the squares of their errors
 EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per roughness; powers of n by which it falls
 FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
@@ -127,11 +129,12 @@ class Cells:
         if len(self.sight.rods):
             pixels = inside[self._touched(inside)]
             opened[pixels] = True
-            number = _numbers(np.clip((MISSED * WHITE / 2 / self.wanted.error) ** (4 / 3), *OF_SMALL))
-            self._sample(pixels, np.full(len(pixels), number))
+            number = np.clip((MISSED * WHITE / 2 / self.wanted.error) ** (4 / 3), *OF_SMALL)
+            self._sample(pixels, _numbers(np.full(len(pixels), number)))
         kernels.crowded(self.points, self.lens, steps, crowded := np.empty(many, np.bool_))
         if np.count_nonzero(crowded) > DENSE * len(inside):
-            pixels = inside[(doubtful & ~opened)[inside]]
+            kernels.doubtful(self.points, self.lens, self.own, CALM * error, steps)
+            pixels = inside[((doubtful | (steps > 0)) & ~opened)[inside]]
             opened[pixels] = True
             self._share_out(pixels, rough, 0.0)
             return opened
@@ -304,13 +307,15 @@ class Cells:
         expected = weights**SPREAD_ERROR / np.average(weights**SPREAD_ERROR, weights=times)
         least = (EDGE * weights / (FAR * error) ** 2) ** (1 / EDGES_FALL)
         squares = error**2 * (len(pixels) + done * (1 - DONE_ERROR**2) + cut * (1 - CUT_ERROR**2))
+        of_sets = edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS
         low, high = -10.0, 10.0
         for _ in range(30):
             middle = (low + high) / 2
-            n = _numbers(np.maximum(2.0**middle * weights**spread, least))
-            more = np.sum(times * expected * (edges * n**-EDGES_FALL + noise * n**-NOISE_FALLS)) > squares
+            low_set, more_of = _between(np.maximum(2.0**middle * weights**spread, least))
+            each = of_sets[low_set] * (1 - more_of) + of_sets[low_set + 1] * more_of
+            more = np.sum(times * expected * each) > squares
             low, high = (middle, high) if more else (low, middle)
-        numbers = _numbers(np.maximum(2.0**high * weights**spread, least))[which]
+        numbers = _numbers(np.maximum(2.0**high * weights**spread, least)[which])
         todo = np.ones(len(pixels), np.bool_)
         todo[pilots] = numbers[pilots] > sum(OF_PILOTS)
         self._sample(pixels[todo], numbers[todo])
@@ -322,7 +327,7 @@ class Cells:
         """
         sets, self.sums[some] = [], 0.0
         for number in OF_PILOTS:
-            light = np.ascontiguousarray(self._mean(some, number, number), np.float32)
+            light = np.ascontiguousarray(self._mean(some, number, number, PILOTS_FILTER), np.float32)
             self.sums[some] += light * (number / sum(OF_PILOTS))
             sets.append(np.empty_like(light))
             kernels.encode(light, self.curve, sets[-1])
@@ -337,19 +342,27 @@ class Cells:
             some = pixels[numbers == number]
             self.sums[some] = self._mean(some, number)
 
-    def _mean(self, pixels: NDArray[np.int64], number: int, seed: int = 0) -> Floats:
-        """Return the mean light of a set of samples of each pixel."""
+    def _mean(self, pixels: NDArray[np.int64], number: int, seed: int = 0, wide: float = 1.0) -> Floats:
+        """Return the mean light of sets of samples, each filtered over its part of the pixel or ``wide`` times it."""
         s = self.sight
-        s.tracer.footprint = s.width[0] / number**0.5, s.width[1] / number**0.5
+        s.tracer.footprint = s.width[0] * wide / number**0.5, s.width[1] * wide / number**0.5
         s.tracer.lobes = -(-LOBE_RAYS // number), number
         light = fixed_sum(s.camera, number, s.seed + seed, self.m[pixels], self.n[pixels], s.batch, s.parts, s.shoot)
         self.rays[pixels] += number
         return light / number
 
 
-def _numbers(least: Any) -> Any:
-    """Return the numbers of samples that are nearest."""
-    return SETS[np.searchsorted(SETS_ENDS, least)]
+def _between(wanted: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """Return which of `SETS` is at most as large as wanted, and the part of the pixels that gets the next one."""
+    at = np.interp(np.log2(wanted), np.log2(SETS), np.arange(len(SETS)))
+    first = np.minimum(at.astype(np.int64), len(SETS) - 2)
+    return first, at - first
+
+
+def _numbers(wanted: Floats) -> NDArray[np.int64]:
+    """Return numbers of samples that are those wanted in the geometric mean."""
+    first, more = _between(wanted)
+    return SETS[first + (GOLDEN * np.arange(len(wanted)) % 1 < more)]
 
 
 def small_rods(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats:
