@@ -40,7 +40,6 @@ RECORDS = Records("anchors", ("benchmarks.coding.anchors", "benchmarks.coding.li
 PHOTOGRAPHS = {reference.name: reference for reference in profile("photographs").pictures}
 SINGLE = ("astronaut", "chelsea", "coffee")  # of scikit-image
 AVIF = "si-avif:best"
-BEST = f"{OURS}:best"
 JPLM = "jplm"  # transforms over all views: of flowers, smaller ones were never chosen, and took 17 times as long
 QUANTISERS = {
     OURS: (33, 39, 45, 51, 57),
@@ -56,7 +55,7 @@ QUANTISERS = {
 BY_RATE = "si-jpeg2000"  # its quantisers are rates in bpp
 OF_SINGLE = (29, 34, 39, 44, 49)  # of `si-lf` for a view alone: the first of many is finer than the rest
 OTHERS = ("svtav1", "jpegxl", BY_RATE, JPLM)
-SCHEMES = (OURS, BEST, BY_RGB, AVIF, "x265", "vvenc", "libaom")
+SCHEMES = (OURS, BY_RGB, AVIF, "x265", "vvenc", "libaom")
 MEASURES = {"ctc": "q_ctc_psnr", "psnr": "q_global", "ssim": "q_ctc_ssim", "worst": "q_ctc_min", "step": "q_ctc_step"}
 LUMA = "luma"  # PSNR of Y in the codes of the common test conditions, mean over views
 LABELS = {"ctc": "CTC", LUMA: "luma", "psnr": "RGB"}
@@ -136,16 +135,14 @@ def luma_psnr(original: IIPicture, decoded: IIPicture, own: Any = None) -> float
     return float((20 * np.log10(PEAK) - 10 * np.log10(np.maximum(error, 1e-6))).mean())
 
 
-def changes(
-    rows: Sequence[Mapping[str, Any]], names: Sequence[str], scheme: str, by_ctc: str = OURS
-) -> dict[str, dict[str, float]]:
+def changes(rows: Sequence[Mapping[str, Any]], names: Sequence[str], scheme: str) -> dict[str, dict[str, float]]:
     """Return Bjøntegaard rates of `si-lf` against a scheme by measure and picture.
 
-    By CTC and luma `si-lf` is ``by_ctc``, tuned for CTC, by RGB tuned for RGB.
+    By CTC and luma `si-lf` is tuned for CTC, by RGB for RGB.
     """
     curves = {(row["picture"], row["scheme"]): row["points"] for row in rows}
     found: dict[str, dict[str, float]] = {}
-    for measure, ours in (("ctc", by_ctc), (LUMA, by_ctc), ("psnr", BY_RGB), ("worst", by_ctc)):
+    for measure, ours in (("ctc", OURS), (LUMA, OURS), ("psnr", BY_RGB), ("worst", OURS)):
         pairs = {name: (curves.get((name, scheme)), curves.get((name, ours))) for name in names}
         rates = {name: rate_change(*pair, measure) for name, pair in pairs.items() if None not in pair}
         found[measure] = {name: rate for name, rate in rates.items() if rate is not None}
@@ -173,13 +170,6 @@ def comparison(
             some = f" of {len(values)}" if len(values) < len(shown) else ""
             cells.append(percent(float(of(values))) + some)
         lines.append([f"**{label}**", "", *cells])
-    slow = {other: changes(rows, shown, other, BEST) for other in others}
-    if all(len(slow[other][measure]) == len(each[other][measure]) for other, measure in columns):
-        cells = [
-            "–" if measure == "psnr" else percent(float(np.mean(list(slow[other][measure].values()))))
-            for other, measure in columns
-        ]
-        lines.append([f"**mean, `{BEST}`**", "", *cells])
     return [*table(" | ".join(["picture", "views of pixels", *heads]), lines)]
 
 
