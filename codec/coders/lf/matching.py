@@ -19,7 +19,6 @@ from .warp import clamped, lead, moved_block
 PAIRS = MOST_REFERENCES * (MOST_REFERENCES + 1) // 2  # the lower triangle by rows
 DIAGONAL = 0, 2, 5, 9
 CELLS = LARGEST // 4
-KEPT = 32  # indices whose differences are kept for a square of 32×32 samples
 HUGE = np.float32(1e30)
 MOST_BEST, BEST = 6, 2  # disparities of least error by the table that are compared as decoded; in a hurried search
 MOST_TRIED = MOST_BEST + 3 + 2
@@ -53,10 +52,6 @@ class Match(NamedTuple):
     sums : ndarray of float32, (PAIRS, LARGEST)
     moved : ndarray of float32, (MOST_REFERENCES, 3 · LARGEST²)
         Differences between a block and its references as decoded, plane by plane and row by row.
-    kept : ndarray of int16, (KEPT, MOST_REFERENCES, 3, LARGEST, LARGEST)
-        Such differences all over the square,
-    known : ndarray of int64, (KEPT, 2)
-        their index, and by a bit a cell where they are known. A square and its parts are compared at the same ones.
     sets : ndarray of float64, (2^MOST_REFERENCES,)
         Sums of inner products over the pairs of each set of references.
     tried : ndarray of int64, (MOST_TRIED,)
@@ -73,8 +68,6 @@ class Match(NamedTuple):
     between: Any
     sums: Any
     moved: Any
-    kept: Any
-    known: Any
     sets: Any
     tried: Any
 
@@ -93,8 +86,6 @@ def new_match(indices: int, every: int, hurried: int = 0) -> Match:
         between=np.zeros(LARGEST + 1, np.float32),
         sums=np.zeros((PAIRS, LARGEST), np.float32),
         moved=np.zeros((MOST_REFERENCES, 3 * LARGEST * LARGEST), np.float32),
-        kept=np.zeros((KEPT, MOST_REFERENCES, 3, LARGEST, LARGEST), np.int16),
-        known=np.zeros((KEPT, 2), np.int64),
         sets=np.zeros(1 << MOST_REFERENCES),
         tried=np.zeros(MOST_TRIED, np.int64),
     )
@@ -173,8 +164,6 @@ def _list_indices(job, match, y0, x0):
 def fill_products(job, original, y0, x0, match):
     """match.products = inner products of the references' differences from the square at (y0, x0)."""
     _list_indices(job, match, y0, x0)
-    for slot in range(match.known.shape[0]):
-        match.known[slot, 1] = 0
     height, width = original.shape[1:]
     rows, cols = min(CELLS, (height - y0) >> 2), min(CELLS, (width - x0) >> 2)
     count = job.references.shape[0]
@@ -283,58 +272,24 @@ def _error_near(match, index):
     return error if error < HUGE else np.float32(0)
 
 
-@stage_kernel
-def _slot(match, index, cells):
-    """Where an index is kept, if need be in place of another, and whether it is known in all of a block's cells."""
-    known, free = match.known, index & (match.known.shape[0] - 1)
-    for slot in range(known.shape[0]):
-        if known[slot, 1] == 0:
-            free = slot
-        elif known[slot, 0] == index:
-            return slot, (known[slot, 1] & cells) == cells
-    known[free, 0], known[free, 1] = index, 0
-    return free, False
-
-
 @part_kernel
-def _keep_differences(job, work, original, y0, x0, h, w, index, planes, kept):
-    """kept = the block's differences from each reference as decoded, at its place in the square."""
+def _compare(job, match, work, original, y0, x0, h, w, index, planes):
+    """match.moved = the block's differences from each reference as decoded."""
     d = index * job.unit
     for r in range(job.references.shape[0]):
-        dy, dx = lead(d, job.references[r, 2]), lead(d, job.references[r, 1])
         for p in range(planes):
             into = work.predicted[p]
             for y in range(h):
                 for x in range(w):
                     into[y, x] = 0
+            dy, dx = lead(d, job.references[r, 2]), lead(d, job.references[r, 1])
             moved_block(job.views, job.references[r, 0], p, y0, x0, h, w, dy, dx, work.rows, work.predicted)
+            missed = match.moved[r]
             for y in range(h):
-                own, moved = original[p, np.uint64(y0 + y)], into[y]
-                row, at = kept[r, p, np.uint64((y0 + y) & (LARGEST - 1))], x0 & (LARGEST - 1)
+                own, moved, at = original[p, np.uint64(y0 + y)], into[y], (p * h + y) * w
                 for x in range(w):
                     difference = np.int32(own[np.uint64(x0 + x)]) - (np.int32(moved[x] + 2048) >> 12)
-                    row[np.uint64(at + x)] = difference
-
-
-@part_kernel
-def _compare(job, match, work, original, y0, x0, h, w, index, planes):
-    """match.moved = the block's differences from each reference as decoded."""
-    top, left = y0 & (LARGEST - 1), x0 & (LARGEST - 1)
-    cells = np.int64(0)
-    for row in range(top >> 2, (top + h) >> 2):
-        cells |= ((1 << (w >> 2)) - 1) << (CELLS * row + (left >> 2))
-    slot, known = _slot(match, index, cells)
-    kept = match.kept[slot]
-    if not known:
-        _keep_differences(job, work, original, y0, x0, h, w, index, planes, kept)
-        match.known[slot, 1] |= cells
-    for r in range(job.references.shape[0]):
-        missed = match.moved[r]
-        for p in range(planes):
-            for y in range(h):
-                row, at = kept[r, p, np.uint64(top + y)], (p * h + y) * w
-                for x in range(w):
-                    missed[np.uint64(at + x)] = np.float32(row[np.uint64(left + x)])
+                    missed[np.uint64(at + x)] = np.float32(difference)
 
 
 @stage_kernel
