@@ -64,7 +64,7 @@ class Coverage(Cells):
             np.empty(count, np.float32), np.empty(self.lens.size, np.bool_),
         )  # fmt: skip
         if len(self.sight.rods):
-            verdict[self._touched(pixels)] = OPEN
+            verdict[self._touched(pixels)[0]] = OPEN
         cut = np.flatnonzero(verdict == CUT)
         if len(cut):
             verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])

@@ -26,6 +26,8 @@ from ..scene.scene import Scene
 from .kernels import cells as kernels
 from .kernels.cells import CUT, DONE, MISSED, OPEN, UNITS, Places, Points, Sides
 from .kernels.sampling import lobe_keys
+from .kernels.sampling import places as set_places
+from .sample_places import fixed_places
 from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
 
@@ -48,6 +50,8 @@ WHITE = 255.0  # code
 SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 5 ns a pixel each
 THIN = 0.75  # pixels across a body, wider ones cover centres and corners all along
 OF_SMALL = 32, 64  # least and most samples where a small or thin body may be
+IN_STRIP, OF_STRIP = 3, (4, 32)  # how much fewer in a strip around it, which has little of the pixel
+SHIFTS = 0.7549, 0.5698  # multiples of them share a square out evenly
 OF_ROD = 500  # vertices that tell the longest axis of a body
 FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
 FINEST = 4096  # places in a pixel along each side that have keys of their own
@@ -127,10 +131,7 @@ class Cells:
         self._look_beyond(steps, rough)
         doubtful = steps > 0
         if len(self.sight.rods):
-            pixels = inside[self._touched(inside)]
-            opened[pixels] = True
-            number = np.clip((MISSED * WHITE / 2 / self.wanted.error) ** (4 / 3), *OF_SMALL)
-            self._sample(pixels, _numbers(np.full(len(pixels), number)))
+            opened[self._small(inside)] = True
         kernels.crowded(self.points, self.lens, steps, crowded := np.empty(many, np.bool_))
         if np.count_nonzero(crowded) > DENSE * len(inside):
             kernels.doubtful(self.points, self.lens, self.own, CALM * error, steps)
@@ -162,14 +163,56 @@ class Cells:
         usual = np.median(rough[steps > 0]) if (steps > 0).any() else 0.0
         steps[other], rough[other] = WHITE, np.maximum(rough[other], usual)
 
-    def _touched(self, pixels: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which pixels small bodies may be seen in."""
-        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
+    def _small(self, inside: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Find the light of those pixels in which small bodies may be seen, and return them."""
+        which, strip = self._touched(inside)
+        pixels, narrow = inside[which], strip[:, 5] > 0
+        number = (MISSED * WHITE / 2 / self.wanted.error) ** (4 / 3)
+        whole = pixels[~narrow]
+        self._sample(whole, _numbers(np.full(len(whole), np.clip(number, *OF_SMALL))))
+        numbers = _numbers(np.full(int(np.count_nonzero(narrow)), np.clip(number / IN_STRIP, *OF_STRIP)))
+        for number in np.unique(numbers).tolist():
+            self._strips(pixels[narrow][numbers == number], strip[narrow][numbers == number], number)
+        return pixels
+
+    def _touched(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
+        """Return which pixels small bodies may be seen in, and strips (n, 6) that have them, see `kernels.strips`."""
+        L, D = self._unit_rays(pixels, 0.5, 0.5)
+        kernels.touched(L, D, self.sight.rods, *self.sight.pixel, one := np.empty(len(pixels), np.int32))
+        which = np.flatnonzero(one != -1)
+        L, D, one = L[which], D[which], one[which]
+        right, down = (2 * (self._unit_rays(pixels[which], *at)[1] - D) for at in ((1.0, 0.5), (0.5, 1.0)))
+        kernels.strips(L, D, right, down, self.sight.rods, one, strip := np.empty((len(which), 6)))
+        seen = strip[:, 5] != 0
+        return which[seen], strip[seen]
+
+    def _unit_rays(self, pixels: NDArray[np.int64], x: float, y: float) -> tuple[Floats, Floats]:
+        within = np.broadcast_to(np.array([x, y]), (len(pixels), 2))
+        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels], within)
         length = np.linalg.norm(D, axis=-1, keepdims=True)
-        found = np.empty(len(pixels), np.bool_)
-        D = np.divide(D, length, out=D, where=length > 0)
-        kernels.touched(L, D, self.sight.rods, *self.sight.pixel, found)
-        return found
+        return L, np.divide(D, length, out=D, where=length > 0)
+
+    def _strips(self, pixels: NDArray[np.int64], strip: Floats, number: int) -> None:
+        """Find the light of pixels by as many samples in the strip of a small body as around it."""
+        s, count = self.sight, 2 * number
+        s.tracer.footprint = s.width[0] / number**0.5, s.width[1] / number**0.5
+        s.tracer.lobes = -(-LOBE_RAYS // count), count
+        self.rays[pixels] += count
+        for start in range(0, len(pixels), s.batch // count):
+            some = slice(start, start + s.batch // count)
+            m, n = self.m[pixels[some]], self.n[pixels[some]]
+            set_of = np.empty((len(m) * number, 2))
+            set_places(s.seed, m, n, s.camera.pixels[0], 0, number, 0, fixed_places(number), set_of)
+            twice = np.tile(set_of.reshape(-1, number, 2), (1, 2, 1))
+            # a body stands in its strip in the same place in all pixels
+            twice[:, :number] = (twice[:, :number] + np.outer(m + 1.6 * n, SHIFTS)[:, None]) % 1.0
+            kernels.strip_places(strip[some], twice, shares := np.empty(twice.shape[:2]))
+            L, D, weights = s.camera.weighted_rays_at(m[:, None], n[:, None], twice)
+            light = s.shoot(
+                L.reshape(-1, 3), D.reshape(-1, 3), None if weights is None else weights.reshape(-1),
+                numbers=(m, n, 0, count), first=None, traced=np.empty(0, np.int32),
+            )  # fmt: skip
+            kernels.add_shares(light, shares, pixels[some], self.sums)
 
     def _near_together(self, pixels: NDArray[np.int64], reach: NDArray[np.float32]) -> NDArray[np.int64]:
         """Return pixels in an order in which the edges that they see are close to each other in the scene.
