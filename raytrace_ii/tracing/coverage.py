@@ -31,7 +31,7 @@ Shares = tuple[Whole, Whole, NDArray[np.float64]]  # numbers of pixels, bodies, 
 class Coverage(Cells):
     """Cells of bodies: each has a light of its own, by which cells tell them apart and mix them."""
 
-    def _trace(self, places: Places, points: Points, bodies: bool) -> None:
+    def _trace(self, places: Places, points: Points, bodies: bool, finer: float) -> None:
         self.sight.check()
         within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
         points.body[:] = self._bodies(

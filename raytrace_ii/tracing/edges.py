@@ -35,8 +35,8 @@ ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not se
 # Numbers of samples of pixels that are no cells. Others above 16 miss more of an edge than these in turn.
 SETS = np.array([2, 3, 4, 6, 9, 12, 16, 32, 64, 128, 256])
 GOLDEN = (5**0.5 - 1) / 2  # multiples of it share pixels out evenly
-CALM = 0.25  # the step at which a pixel of such a tile gets a set, in parts of that elsewhere
 DENSE = 0.3  # share of the pixels, around which much meets, from which on no edges are looked for
+BLOCK, BLOCKS, FEW = 16, 16, 4096  # pixels along a block, one of how many tells of a tile, pixels that all do
 LOOSE = 2.0  # how much more than the error wanted of all pixels may be hidden in one
 SPREAD, SPREAD_ERROR = 0.3, 0.75  # powers of the roughness by which samples of a pixel and their error grow
 PILOTS, OF_PILOTS = 768, (4, 9)  # pixels of a tile that get two sets, which tell of the error
@@ -49,10 +49,11 @@ FOLLOWED, OF_THIN = 64, 16  # how far a thin body is followed, in pixels, and sa
 WHITE = 255.0  # code
 SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 5 ns a pixel each
 THIN = 0.75  # pixels across a body, wider ones cover centres and corners all along
-OF_SMALL = 32, 64  # least and most samples where a small or thin body may be
-IN_STRIP, OF_STRIP = 3, (4, 32)  # how much fewer in a strip around it, which has little of the pixel
+OF_SMALL = 16, 64  # least and most samples where a small or thin body may be
+IN_STRIP, OF_STRIP = 2, (4, 64)  # how much fewer in a strip around it, which has little of the pixel
 SHIFTS = 0.7549, 0.5698  # multiples of them share a square out evenly
 OF_ROD = 500  # vertices that tell the longest axis of a body
+OF_BOX = 1000  # pixels that tell where the content is
 FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
 FINEST = 4096  # places in a pixel along each side that have keys of their own
 RECORDED = frozenset({"object_id", "shading_normal", "ray_length"})  # what centres have to record
@@ -111,9 +112,9 @@ class Cells:
         self.rays, self.sums = np.ones(n, np.int32), np.zeros((n, 3))
         self.verdicts = np.full(n, -1, np.int8)
 
-    def look_around(self, centres: Places) -> None:
-        """Look at centres of the rim."""
-        first = self._look(centres)
+    def look_around(self, centres: Places, finer: float = FINER) -> None:
+        """Look at centres of pixels, of the rim as a rule."""
+        first = self._look(centres, finer=finer)
         for array in self.points:
             array[centres.pixel] = array[first : self._count]
         self._count = first
@@ -132,13 +133,6 @@ class Cells:
         doubtful = steps > 0
         if len(self.sight.rods):
             opened[self._small(inside)] = True
-        kernels.crowded(self.points, self.lens, steps, crowded := np.empty(many, np.bool_))
-        if np.count_nonzero(crowded) > DENSE * len(inside):
-            kernels.doubtful(self.points, self.lens, self.own, CALM * error, steps)
-            pixels = inside[((doubtful | (steps > 0)) & ~opened)[inside]]
-            opened[pixels] = True
-            self._share_out(pixels, rough, 0.0)
-            return opened
         left, thin = [], np.zeros(many, np.bool_)
         corner_of = np.full((many, 4), -1, np.int32)
         for _ in range(ROUNDS):
@@ -147,9 +141,37 @@ class Cells:
                 break
             opened[pixels] = True
             left.append(self._open(self._near_together(pixels, reach), corner_of, doubtful, rough, thin))
-        self._share_out(np.concatenate(left or [inside[:0]]), rough, SPREAD)
+        self._share_out(np.concatenate(left or [inside[:0]]), rough)
         self._follow(thin, opened)
         return opened
+
+    def dense(self, some: NDArray[np.int64]) -> bool:
+        """Tell by some of the pixels whether sets in all of them are worth more than looking for edges."""
+        half = np.full(len(some), UNITS / 2, np.float32)
+        self.look_around(Places(some.astype(np.int32), half, half), 1.0)
+        own = np.zeros(self.lens.size, np.bool_)
+        own[some] = True
+        lens, crowded = np.where(own.reshape(self.lens.shape), self.lens, -1), np.empty(self.lens.size, np.bool_)
+        steps = np.empty(self.lens.size, np.float32)
+        kernels.doubtful(self.points, lens, own, LOOSE * self.wanted.error, steps)
+        kernels.crowded(self.points, lens, steps, crowded)
+        return bool(np.count_nonzero(crowded) > DENSE * len(some))
+
+    def fill(self, some: NDArray[np.int64], order: NDArray[np.int64]) -> None:
+        """Find the light of all pixels by sets of two numbers of samples that some of the pixels tell."""
+        rough = np.empty(self.lens.size, np.float32)
+        kernels.roughness(self.points, self.lens, np.empty((self.lens.size, 2), np.float32), rough)
+        pilots = some[max(len(some) // PILOTS, 4) // 2 :: max(len(some) // PILOTS, 4)]
+        edges, noise = self._pilot(pilots, float(np.mean(np.maximum(rough[pilots], 1.0))))
+        squares = edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS
+        at = np.interp(-(self.wanted.error**2), -squares, np.arange(len(SETS)))
+        more = GOLDEN * np.arange(len(order)) % 1 < at % 1
+        numbers = SETS[np.minimum(int(at) + more, len(SETS) - 1)]
+        if len(self.sight.rods):
+            thin = np.zeros(self.lens.size, np.bool_)
+            thin[self._small(order)] = True
+            numbers, order = numbers[~thin[order]], order[~thin[order]]
+        self._sample(order, numbers)
 
     def _look_beyond(self, steps: NDArray[np.float32], rough: NDArray[np.float32]) -> None:
         """Doubt pixels at the border of a lens on whose outer side another body is seen."""
@@ -177,10 +199,11 @@ class Cells:
 
     def _touched(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
         """Return which pixels small bodies may be seen in, and strips (n, 6) that have them, see `kernels.strips`."""
-        L, D = self._unit_rays(pixels, 0.5, 0.5)
-        kernels.touched(L, D, self.sight.rods, *self.sight.pixel, one := np.empty(len(pixels), np.int32))
+        one = np.empty(len(pixels), np.int32)
+        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
+        kernels.touched(L, D, self.sight.rods, *self.sight.pixel, one)
         which = np.flatnonzero(one != -1)
-        L, D, one = L[which], D[which], one[which]
+        one, (L, D) = one[which], self._unit_rays(pixels[which], 0.5, 0.5)
         right, down = (2 * (self._unit_rays(pixels[which], *at)[1] - D) for at in ((1.0, 0.5), (0.5, 1.0)))
         kernels.strips(L, D, right, down, self.sight.rods, one, strip := np.empty((len(which), 6)))
         seen = strip[:, 5] != 0
@@ -223,15 +246,16 @@ class Cells:
         near = np.empty(self.lens.size, np.float32)
         kernels.nearest_around(reach, self.lens, near)
         L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
-        far = near[pixels].astype(np.float64)
+        far = near[pixels]
         known = np.isfinite(far)
         far[~known] = np.median(far[known]) if known.any() else 1.0
-        length = np.linalg.norm(D, axis=-1)
-        points = L + D * (far / np.where(length > 0, length, 1.0))[:, None]
-        low, high = np.percentile(points, (1, 99), axis=0)
-        steps = ((points - low) / np.where(high > low, high - low, 1.0) * 1023).clip(0, 1023).astype(np.int64)
-        ranks = sum((steps[:, axis] >> bit & 1) << (3 * bit + axis) for bit in range(10) for axis in range(3))
-        return pixels[np.argsort(ranks, kind="stable")]
+        some = slice(None, None, -(-len(pixels) // OF_BOX))
+        length = np.linalg.norm(D[some], axis=-1)
+        ends = L[some] + D[some] * (far[some] / np.where(length > 0, length, 1.0))[:, None]
+        low, high = np.percentile(ends, (1, 99), axis=0)
+        boxes = np.empty(len(pixels), np.uint16)
+        kernels.boxes(L, D, far, low, 32 / np.maximum(high - low, 1e-9), boxes)
+        return pixels[np.argsort(boxes, kind="stable")]
 
     def _open(
         self, pixels: NDArray[np.int64], corner_of: Whole, wanted: NDArray[np.bool_], rough: NDArray[np.float32],
@@ -300,7 +324,7 @@ class Cells:
         verdict[sure] = checked
         return verdict
 
-    def _look(self, places: Places, bodies: bool = False) -> int:
+    def _look(self, places: Places, bodies: bool = False, finer: float = FINER) -> int:
         """Look at places; return the row of the first of their points, of which ``bodies`` alone may be wanted."""
         first, n, s = self._count, len(places.pixel), self.sight
         self._count += n
@@ -310,12 +334,12 @@ class Cells:
         kernels.count_rays(places.pixel, self.rays)
         for start in range(0, n, s.batch):
             some = slice(start, start + s.batch)
-            self._trace(_part(places, some), _part(points, some), bodies)
+            self._trace(_part(places, some), _part(points, some), bodies, finer)
         if not bodies:
             kernels.encode(points.light, self.curve, points.code)
         return first
 
-    def _trace(self, places: Places, points: Points, bodies: bool) -> None:
+    def _trace(self, places: Places, points: Points, bodies: bool, finer: float) -> None:
         s, m, n = self.sight, self.m[places.pixel], self.n[places.pixel]
         s.check()
         within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
@@ -329,13 +353,13 @@ class Cells:
             keys = np.empty(len(m), np.uint64)
             across, down = FINEST * m + fine[:, 0], FINEST * n + fine[:, 1]
             lobe_keys(s.seed, across, down, FINEST * s.camera.pixels[0] + 1, 0, 1, keys)
-        s.tracer.footprint, s.tracer.lobes = (s.width[0] / FINER, s.width[1] / FINER), (LOBE_RAYS, 1)
+        s.tracer.footprint, s.tracer.lobes = (s.width[0] / finer, s.width[1] / finer), (LOBE_RAYS, 1)
         points.light[:] = 0
         s.tracer.run(
             *rays[:2], points.light, Support(object_id=points.body, shading_normal=points.normal), rays[2], keys
         )
 
-    def _share_out(self, pixels: NDArray[np.int64], rough: NDArray[np.float32], spread: float) -> None:
+    def _share_out(self, pixels: NDArray[np.int64], rough: NDArray[np.float32]) -> None:
         """Find the light of pixels by sets of samples, as many as give all opened pixels the error wanted."""
         if not len(pixels):
             return
@@ -354,11 +378,11 @@ class Cells:
         low, high = -10.0, 10.0
         for _ in range(30):
             middle = (low + high) / 2
-            low_set, more_of = _between(np.maximum(2.0**middle * weights**spread, least))
+            low_set, more_of = _between(np.maximum(2.0**middle * weights**SPREAD, least))
             each = of_sets[low_set] * (1 - more_of) + of_sets[low_set + 1] * more_of
             more = np.sum(times * expected * each) > squares
             low, high = (middle, high) if more else (low, middle)
-        numbers = _numbers(np.maximum(2.0**high * weights**spread, least)[which])
+        numbers = _numbers(np.maximum(2.0**high * weights**SPREAD, least)[which])
         todo = np.ones(len(pixels), np.bool_)
         todo[pilots] = numbers[pilots] > sum(OF_PILOTS)
         self._sample(pixels[todo], numbers[todo])
@@ -434,6 +458,23 @@ def _rod(vertices: Floats) -> Floats:
         if radius > np.ptp(along) / 4:
             break
     return np.array([*(middle + along.min() * axis), *(middle + along.max() * axis), radius])
+
+
+def dense_mean(
+    sight: Sight, wanted: Edges, rows: slice, cols: slice, order: Whole, curve: Floats
+) -> tuple[Radiance, Whole] | None:
+    """Return what `edge_mean` does for a block of fine structure, without looking for edges; None for any other."""
+    n, m = np.mgrid[rows, cols]
+    k, l = sight.camera.lens_lattice.nearest(m, n)
+    lens = np.asarray(l, np.int64) * sight.camera.lenses[0] + np.asarray(k, np.int64)
+    cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, np.ones(lens.size, np.bool_))
+    chosen = (m // BLOCK + 4 * (n // BLOCK)) % BLOCKS == BLOCKS // 3
+    some = np.flatnonzero(chosen | (lens.size <= FEW))
+    if not cells.dense(some):
+        return None
+    inside = order.astype(np.int64)
+    cells.fill(some, inside)
+    return cells.sums[inside].astype(np.float32), cells.rays[inside] - 1
 
 
 def edge_mean(

@@ -193,6 +193,21 @@ def beyond(lens, own, steps, places):
     return made
 
 
+@kernel
+def boxes(locations, directions, far, low, scale, out):
+    """Numbers of those of 32³ boxes from ``low`` on in which rays end, neighbours beside each other (Morton)."""
+    for i in range(far.shape[0]):
+        dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        way, number = far[i] / length if length > 0.0 else 0.0, 0
+        for axis in range(3):
+            at = (locations[i, axis] + way * directions[i, axis] - low[axis]) * scale[axis]
+            step = int(min(max(at, 0.0), 31.0))
+            for bit in range(5):
+                number |= (step >> bit & 1) << (3 * bit + axis)
+        out[i] = number
+
+
 @inline_kernel
 def _like(points, i, j, step):
     return _one_surface(points, i, j) and _apart(points, i, j) <= LIKE * step
@@ -227,7 +242,7 @@ def _touches(x, y, z, u, v, w, radius, dx, dy, dz, width, spread):
 
 @kernel
 def touched(locations, directions, rods, width, spread, one):
-    """Tell which rods (two ends, radius) may be seen in pixels, by rays of unit directions through their centres.
+    """Tell which rods (two ends, radius) may be seen in pixels, by rays through their centres.
 
     ``one`` is a rod's number if it is the only one, −1 without any, −2 with several. Pixels are ``width`` wide where
     their rays start and grow by ``spread`` a mm.
@@ -236,6 +251,9 @@ def touched(locations, directions, rods, width, spread, one):
         found = -1
         lx, ly, lz = locations[i, 0], locations[i, 1], locations[i, 2]
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        scale = 1.0 / length if length > 0.0 else 0.0
+        dx, dy, dz = dx * scale, dy * scale, dz * scale
         for b in range(rods.shape[0]):
             if _touches(
                 rods[b, 0] - lx, rods[b, 1] - ly, rods[b, 2] - lz, rods[b, 3] - rods[b, 0], rods[b, 4] - rods[b, 1],
@@ -258,6 +276,14 @@ def _seen_at(rods, b, end, place, d, right, down):
     rs = right[0] * down[0] + right[1] * down[1] + right[2] * down[2]
     det = max(rr * ss - rs * rs, 1e-300)
     return (a * ss - c * rs) / det, (c * rr - a * rs) / det, along
+
+
+@inline_kernel
+def _turn(rods, b, d):
+    """Cosine between a rod and a unit direction; 1 of a rod without length."""
+    u, v, w = rods[b, 3] - rods[b, 0], rods[b, 4] - rods[b, 1], rods[b, 5] - rods[b, 2]
+    length = math.sqrt(u * u + v * v + w * w)
+    return (u * d[0] + v * d[1] + w * d[2]) / length if length > 0.0 else 1.0
 
 
 @kernel
@@ -283,11 +309,14 @@ def strips(locations, directions, right, down, rods, one, strip):
         swap = abs(by - ay) > abs(bx - ax)
         ax, ay, bx, by = (ay, ax, by, bx) if swap else (ax, ay, bx, by)
         slope = (by - ay) / (bx - ax) if abs(bx - ax) > 1e-9 else 0.0
-        low, high = max(min(ax, bx) - radius + 0.5, 0.0), min(max(ax, bx) + radius + 0.5, 1.0)
-        half, height = radius * math.sqrt(1.0 + slope * slope), ay + 0.5 - slope * (ax + 0.5)
+        tilt = math.sqrt(1.0 + slope * slope)
+        end = radius * (abs(_turn(rods, b, directions[i])) + abs(slope)) / tilt + SPARE  # a disc across the rod
+        low, high = max(min(ax, bx) - end + 0.5, 0.0), min(max(ax, bx) + end + 0.5, 1.0)
+        half, height = radius * tilt, ay + 0.5 - slope * (ax + 0.5)
         one_end, other = height + slope * low, height + slope * high
         seen = high > low and max(one_end, other) + half > 0.0 and min(one_end, other) - half < 1.0
-        strip[i, 0], strip[i, 1], strip[i, 2], strip[i, 3], strip[i, 4] = 1.0 if swap else 0.0, low, high, height, slope
+        strip[i, 0], strip[i, 1], strip[i, 2] = 1.0 if swap else 0.0, low, high
+        strip[i, 3], strip[i, 4] = height, slope
         strip[i, 5] = 0.0 if not seen else (half if (high - low) * 2.0 * half < MOST_STRIP else -1.0)
 
 
