@@ -3,12 +3,13 @@
 A pixel whose neighbours under the same lens look alike has the light of its centre. Any other one is a cell between
 corners that neighbours share, see `kernels.cells`. If corners and centre agree, it has their mean; an edge between
 two groups of them is found by bisection, mostly by visibility alone, and checked on both sides. What is neither gets
-a set of samples, and so do pixels in which a body of few pixels may be. A tile that is full of such pixels gets sets
-at once. (Corners and their comparison: Whitted 1980.)
+a set of samples. Small and thin bodies, which all of these may miss, have sets of their own in the strip of the pixel
+in which they are seen. A tile of fine structure, which a sixteenth of its pixels tell, gets sets in all its pixels.
+(Corners and their comparison: Whitted 1980.)
 
 The error wanted is the root mean square of all pixels of a tile that get more than a ray. Some of them get two sets,
 whose difference tells how far sets of any number are off; the others get as many samples as the error then allows,
-more where the picture is rougher. Not known to it: what the filter of textures errs alike in all sets.
+more where the picture is rougher. What the filter of textures errs alike in all sets is told by a narrower one.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ BLOCK, BLOCKS, FEW = 16, 16, 4096  # pixels along a block, one of how many tells
 LOOSE = 2.0  # how much more than the error wanted of all pixels may be hidden in one
 SPREAD, SPREAD_ERROR = 0.3, 0.75  # powers of the roughness by which samples of a pixel and their error grow
 PILOTS, OF_PILOTS = 768, (4, 9)  # pixels of a tile that get two sets, which tell of the error
-PILOTS_FILTER = 0.6  # times the width of a set's filter: what it errs alike in all sets, scatters instead
+PILOTS_FILTER = 0.6  # times the width of a set's filter: what that errs alike in all sets scatters
 ALIKE = 0.8  # square of the difference of both in parts of the sum of the squares of their errors
 EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per roughness; powers of n by which it falls
 FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
