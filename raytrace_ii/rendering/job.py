@@ -16,7 +16,7 @@ from ii_core.base.colour import srgb
 
 from ..scene.scene import Scene
 from ..tracing.coverage import covered
-from ..tracing.edges import RECORDED, Sight, edge_mean, small_rods
+from ..tracing.edges import RECORDED, Sight, dense_mean, edge_mean, small_rods
 from ..tracing.kernels.arrays import Start
 from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
@@ -328,10 +328,14 @@ class Job:
         """Return radiance of a tile, rays per pixel and support arrays, in the order of the rays."""
         codes, camera, width = CURVES["uint8"], self.camera, self._footprint()
         assert isinstance(camera, IICamera) and codes is not None
-        support = Support.empty((len(order.pixels),), self._recorded() | RECORDED)
+        found = dense_mean(self._sight(tracer), wanted, rows, cols, order.pixels, codes)
+        names = self._recorded() if found else self._recorded() | RECORDED
+        support = Support.empty((len(order.pixels),), names)
         tracer.footprint, tracer.lobes = width, (LOBE_RAYS, 1)
-        centres = self._fixed(tracer, 1, rows, cols, order, support)
-        found = edge_mean(self._sight(tracer), wanted, rows, cols, order.pixels, centres, support, codes)
+        if names:
+            centres = self._fixed(tracer, 1, rows, cols, order, support)
+        if found is None:
+            found = edge_mean(self._sight(tracer), wanted, rows, cols, order.pixels, centres, support, codes)
         return *found, support
 
     def _covered(self, tracer: Tracer, rows: slice, cols: slice, order: Order) -> NDArray[np.float32]:

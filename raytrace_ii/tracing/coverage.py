@@ -31,7 +31,7 @@ Shares = tuple[Whole, Whole, NDArray[np.float64]]  # numbers of pixels, bodies, 
 class Coverage(Cells):
     """Cells of bodies: each has a light of its own, by which cells tell them apart and mix them."""
 
-    def _trace(self, places: Places, points: Points, bodies: bool) -> None:
+    def _trace(self, places: Places, points: Points, bodies: bool, finer: float) -> None:
         self.sight.check()
         within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
         points.body[:] = self._bodies(
@@ -64,7 +64,7 @@ class Coverage(Cells):
             np.empty(count, np.float32), np.empty(self.lens.size, np.bool_),
         )  # fmt: skip
         if len(self.sight.rods):
-            verdict[self._touched(pixels)] = OPEN
+            verdict[self._touched(pixels)[0]] = OPEN
         cut = np.flatnonzero(verdict == CUT)
         if len(cut):
             verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])

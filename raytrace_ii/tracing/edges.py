@@ -3,12 +3,13 @@
 A pixel whose neighbours under the same lens look alike has the light of its centre. Any other one is a cell between
 corners that neighbours share, see `kernels.cells`. If corners and centre agree, it has their mean; an edge between
 two groups of them is found by bisection, mostly by visibility alone, and checked on both sides. What is neither gets
-a set of samples, and so do pixels in which a body of few pixels may be. A tile that is full of such pixels gets sets
-at once. (Corners and their comparison: Whitted 1980.)
+a set of samples. Small and thin bodies, which all of these may miss, have sets of their own in the strip of the pixel
+in which they are seen. A tile of fine structure, which a sixteenth of its pixels tell, gets sets in all its pixels.
+(Corners and their comparison: Whitted 1980.)
 
 The error wanted is the root mean square of all pixels of a tile that get more than a ray. Some of them get two sets,
 whose difference tells how far sets of any number are off; the others get as many samples as the error then allows,
-more where the picture is rougher. Not known to it: what the filter of textures errs alike in all sets.
+more where the picture is rougher. What the filter of textures errs alike in all sets is told by a narrower one.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from ..scene.scene import Scene
 from .kernels import cells as kernels
 from .kernels.cells import CUT, DONE, MISSED, OPEN, UNITS, Places, Points, Sides
 from .kernels.sampling import lobe_keys
+from .kernels.sampling import places as set_places
+from .sample_places import fixed_places
 from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
 
@@ -33,12 +36,12 @@ ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not se
 # Numbers of samples of pixels that are no cells. Others above 16 miss more of an edge than these in turn.
 SETS = np.array([2, 3, 4, 6, 9, 12, 16, 32, 64, 128, 256])
 GOLDEN = (5**0.5 - 1) / 2  # multiples of it share pixels out evenly
-CALM = 0.25  # the step at which a pixel of such a tile gets a set, in parts of that elsewhere
 DENSE = 0.3  # share of the pixels, around which much meets, from which on no edges are looked for
+BLOCK, BLOCKS, FEW = 16, 16, 4096  # pixels along a block, one of how many tells of a tile, pixels that all do
 LOOSE = 2.0  # how much more than the error wanted of all pixels may be hidden in one
 SPREAD, SPREAD_ERROR = 0.3, 0.75  # powers of the roughness by which samples of a pixel and their error grow
 PILOTS, OF_PILOTS = 768, (4, 9)  # pixels of a tile that get two sets, which tell of the error
-PILOTS_FILTER = 0.6  # times the width of a set's filter: what it errs alike in all sets, scatters instead
+PILOTS_FILTER = 0.6  # times the width of a set's filter: what that errs alike in all sets scatters
 ALIKE = 0.8  # square of the difference of both in parts of the sum of the squares of their errors
 EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per roughness; powers of n by which it falls
 FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
@@ -47,8 +50,11 @@ FOLLOWED, OF_THIN = 64, 16  # how far a thin body is followed, in pixels, and sa
 WHITE = 255.0  # code
 SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 5 ns a pixel each
 THIN = 0.75  # pixels across a body, wider ones cover centres and corners all along
-OF_SMALL = 32, 64  # least and most samples where a small or thin body may be
+OF_SMALL = 16, 64  # least and most samples where a small or thin body may be
+IN_STRIP, OF_STRIP = 2, (4, 64)  # how much fewer in a strip around it, which has little of the pixel
+SHIFTS = 0.7549, 0.5698  # multiples of them share a square out evenly
 OF_ROD = 500  # vertices that tell the longest axis of a body
+OF_BOX = 1000  # pixels that tell where the content is
 FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
 FINEST = 4096  # places in a pixel along each side that have keys of their own
 RECORDED = frozenset({"object_id", "shading_normal", "ray_length"})  # what centres have to record
@@ -107,9 +113,9 @@ class Cells:
         self.rays, self.sums = np.ones(n, np.int32), np.zeros((n, 3))
         self.verdicts = np.full(n, -1, np.int8)
 
-    def look_around(self, centres: Places) -> None:
-        """Look at centres of the rim."""
-        first = self._look(centres)
+    def look_around(self, centres: Places, finer: float = FINER) -> None:
+        """Look at centres of pixels, of the rim as a rule."""
+        first = self._look(centres, finer=finer)
         for array in self.points:
             array[centres.pixel] = array[first : self._count]
         self._count = first
@@ -127,17 +133,7 @@ class Cells:
         self._look_beyond(steps, rough)
         doubtful = steps > 0
         if len(self.sight.rods):
-            pixels = inside[self._touched(inside)]
-            opened[pixels] = True
-            number = np.clip((MISSED * WHITE / 2 / self.wanted.error) ** (4 / 3), *OF_SMALL)
-            self._sample(pixels, _numbers(np.full(len(pixels), number)))
-        kernels.crowded(self.points, self.lens, steps, crowded := np.empty(many, np.bool_))
-        if np.count_nonzero(crowded) > DENSE * len(inside):
-            kernels.doubtful(self.points, self.lens, self.own, CALM * error, steps)
-            pixels = inside[((doubtful | (steps > 0)) & ~opened)[inside]]
-            opened[pixels] = True
-            self._share_out(pixels, rough, 0.0)
-            return opened
+            opened[self._small(inside)] = True
         left, thin = [], np.zeros(many, np.bool_)
         corner_of = np.full((many, 4), -1, np.int32)
         for _ in range(ROUNDS):
@@ -146,9 +142,37 @@ class Cells:
                 break
             opened[pixels] = True
             left.append(self._open(self._near_together(pixels, reach), corner_of, doubtful, rough, thin))
-        self._share_out(np.concatenate(left or [inside[:0]]), rough, SPREAD)
+        self._share_out(np.concatenate(left or [inside[:0]]), rough)
         self._follow(thin, opened)
         return opened
+
+    def dense(self, some: NDArray[np.int64]) -> bool:
+        """Tell by some of the pixels whether sets in all of them are worth more than looking for edges."""
+        half = np.full(len(some), UNITS / 2, np.float32)
+        self.look_around(Places(some.astype(np.int32), half, half), 1.0)
+        own = np.zeros(self.lens.size, np.bool_)
+        own[some] = True
+        lens, crowded = np.where(own.reshape(self.lens.shape), self.lens, -1), np.empty(self.lens.size, np.bool_)
+        steps = np.empty(self.lens.size, np.float32)
+        kernels.doubtful(self.points, lens, own, LOOSE * self.wanted.error, steps)
+        kernels.crowded(self.points, lens, steps, crowded)
+        return bool(np.count_nonzero(crowded) > DENSE * len(some))
+
+    def fill(self, some: NDArray[np.int64], order: NDArray[np.int64]) -> None:
+        """Find the light of all pixels by sets of two numbers of samples that some of the pixels tell."""
+        rough = np.empty(self.lens.size, np.float32)
+        kernels.roughness(self.points, self.lens, np.empty((self.lens.size, 2), np.float32), rough)
+        pilots = some[max(len(some) // PILOTS, 4) // 2 :: max(len(some) // PILOTS, 4)]
+        edges, noise = self._pilot(pilots, float(np.mean(np.maximum(rough[pilots], 1.0))))
+        squares = edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS
+        at = np.interp(-(self.wanted.error**2), -squares, np.arange(len(SETS)))
+        more = GOLDEN * np.arange(len(order)) % 1 < at % 1
+        numbers = SETS[np.minimum(int(at) + more, len(SETS) - 1)]
+        if len(self.sight.rods):
+            thin = np.zeros(self.lens.size, np.bool_)
+            thin[self._small(order)] = True
+            numbers, order = numbers[~thin[order]], order[~thin[order]]
+        self._sample(order, numbers)
 
     def _look_beyond(self, steps: NDArray[np.float32], rough: NDArray[np.float32]) -> None:
         """Doubt pixels at the border of a lens on whose outer side another body is seen."""
@@ -162,14 +186,57 @@ class Cells:
         usual = np.median(rough[steps > 0]) if (steps > 0).any() else 0.0
         steps[other], rough[other] = WHITE, np.maximum(rough[other], usual)
 
-    def _touched(self, pixels: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which pixels small bodies may be seen in."""
+    def _small(self, inside: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Find the light of those pixels in which small bodies may be seen, and return them."""
+        which, strip = self._touched(inside)
+        pixels, narrow = inside[which], strip[:, 5] > 0
+        number = (MISSED * WHITE / 2 / self.wanted.error) ** (4 / 3)
+        whole = pixels[~narrow]
+        self._sample(whole, _numbers(np.full(len(whole), np.clip(number, *OF_SMALL))))
+        numbers = _numbers(np.full(int(np.count_nonzero(narrow)), np.clip(number / IN_STRIP, *OF_STRIP)))
+        for number in np.unique(numbers).tolist():
+            self._strips(pixels[narrow][numbers == number], strip[narrow][numbers == number], number)
+        return pixels
+
+    def _touched(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
+        """Return which pixels small bodies may be seen in, and strips (n, 6) that have them, see `kernels.strips`."""
+        one = np.empty(len(pixels), np.int32)
         L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
+        kernels.touched(L, D, self.sight.rods, *self.sight.pixel, one)
+        which = np.flatnonzero(one != -1)
+        one, (L, D) = one[which], self._unit_rays(pixels[which], 0.5, 0.5)
+        right, down = (2 * (self._unit_rays(pixels[which], *at)[1] - D) for at in ((1.0, 0.5), (0.5, 1.0)))
+        kernels.strips(L, D, right, down, self.sight.rods, one, strip := np.empty((len(which), 6)))
+        seen = strip[:, 5] != 0
+        return which[seen], strip[seen]
+
+    def _unit_rays(self, pixels: NDArray[np.int64], x: float, y: float) -> tuple[Floats, Floats]:
+        within = np.broadcast_to(np.array([x, y]), (len(pixels), 2))
+        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels], within)
         length = np.linalg.norm(D, axis=-1, keepdims=True)
-        found = np.empty(len(pixels), np.bool_)
-        D = np.divide(D, length, out=D, where=length > 0)
-        kernels.touched(L, D, self.sight.rods, *self.sight.pixel, found)
-        return found
+        return L, np.divide(D, length, out=D, where=length > 0)
+
+    def _strips(self, pixels: NDArray[np.int64], strip: Floats, number: int) -> None:
+        """Find the light of pixels by as many samples in the strip of a small body as around it."""
+        s, count = self.sight, 2 * number
+        s.tracer.footprint = s.width[0] / number**0.5, s.width[1] / number**0.5
+        s.tracer.lobes = -(-LOBE_RAYS // count), count
+        self.rays[pixels] += count
+        for start in range(0, len(pixels), s.batch // count):
+            some = slice(start, start + s.batch // count)
+            m, n = self.m[pixels[some]], self.n[pixels[some]]
+            set_of = np.empty((len(m) * number, 2))
+            set_places(s.seed, m, n, s.camera.pixels[0], 0, number, 0, fixed_places(number), set_of)
+            twice = np.tile(set_of.reshape(-1, number, 2), (1, 2, 1))
+            # a body stands in its strip in the same place in all pixels
+            twice[:, :number] = (twice[:, :number] + np.outer(m + 1.6 * n, SHIFTS)[:, None]) % 1.0
+            kernels.strip_places(strip[some], twice, shares := np.empty(twice.shape[:2]))
+            L, D, weights = s.camera.weighted_rays_at(m[:, None], n[:, None], twice)
+            light = s.shoot(
+                L.reshape(-1, 3), D.reshape(-1, 3), None if weights is None else weights.reshape(-1),
+                numbers=(m, n, 0, count), first=None, traced=np.empty(0, np.int32),
+            )  # fmt: skip
+            kernels.add_shares(light, shares, pixels[some], self.sums)
 
     def _near_together(self, pixels: NDArray[np.int64], reach: NDArray[np.float32]) -> NDArray[np.int64]:
         """Return pixels in an order in which the edges that they see are close to each other in the scene.
@@ -180,15 +247,16 @@ class Cells:
         near = np.empty(self.lens.size, np.float32)
         kernels.nearest_around(reach, self.lens, near)
         L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
-        far = near[pixels].astype(np.float64)
+        far = near[pixels]
         known = np.isfinite(far)
         far[~known] = np.median(far[known]) if known.any() else 1.0
-        length = np.linalg.norm(D, axis=-1)
-        points = L + D * (far / np.where(length > 0, length, 1.0))[:, None]
-        low, high = np.percentile(points, (1, 99), axis=0)
-        steps = ((points - low) / np.where(high > low, high - low, 1.0) * 1023).clip(0, 1023).astype(np.int64)
-        ranks = sum((steps[:, axis] >> bit & 1) << (3 * bit + axis) for bit in range(10) for axis in range(3))
-        return pixels[np.argsort(ranks, kind="stable")]
+        some = slice(None, None, -(-len(pixels) // OF_BOX))
+        length = np.linalg.norm(D[some], axis=-1)
+        ends = L[some] + D[some] * (far[some] / np.where(length > 0, length, 1.0))[:, None]
+        low, high = np.percentile(ends, (1, 99), axis=0)
+        boxes = np.empty(len(pixels), np.uint16)
+        kernels.boxes(L, D, far, low, 32 / np.maximum(high - low, 1e-9), boxes)
+        return pixels[np.argsort(boxes, kind="stable")]
 
     def _open(
         self, pixels: NDArray[np.int64], corner_of: Whole, wanted: NDArray[np.bool_], rough: NDArray[np.float32],
@@ -257,7 +325,7 @@ class Cells:
         verdict[sure] = checked
         return verdict
 
-    def _look(self, places: Places, bodies: bool = False) -> int:
+    def _look(self, places: Places, bodies: bool = False, finer: float = FINER) -> int:
         """Look at places; return the row of the first of their points, of which ``bodies`` alone may be wanted."""
         first, n, s = self._count, len(places.pixel), self.sight
         self._count += n
@@ -267,12 +335,12 @@ class Cells:
         kernels.count_rays(places.pixel, self.rays)
         for start in range(0, n, s.batch):
             some = slice(start, start + s.batch)
-            self._trace(_part(places, some), _part(points, some), bodies)
+            self._trace(_part(places, some), _part(points, some), bodies, finer)
         if not bodies:
             kernels.encode(points.light, self.curve, points.code)
         return first
 
-    def _trace(self, places: Places, points: Points, bodies: bool) -> None:
+    def _trace(self, places: Places, points: Points, bodies: bool, finer: float) -> None:
         s, m, n = self.sight, self.m[places.pixel], self.n[places.pixel]
         s.check()
         within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
@@ -286,13 +354,13 @@ class Cells:
             keys = np.empty(len(m), np.uint64)
             across, down = FINEST * m + fine[:, 0], FINEST * n + fine[:, 1]
             lobe_keys(s.seed, across, down, FINEST * s.camera.pixels[0] + 1, 0, 1, keys)
-        s.tracer.footprint, s.tracer.lobes = (s.width[0] / FINER, s.width[1] / FINER), (LOBE_RAYS, 1)
+        s.tracer.footprint, s.tracer.lobes = (s.width[0] / finer, s.width[1] / finer), (LOBE_RAYS, 1)
         points.light[:] = 0
         s.tracer.run(
             *rays[:2], points.light, Support(object_id=points.body, shading_normal=points.normal), rays[2], keys
         )
 
-    def _share_out(self, pixels: NDArray[np.int64], rough: NDArray[np.float32], spread: float) -> None:
+    def _share_out(self, pixels: NDArray[np.int64], rough: NDArray[np.float32]) -> None:
         """Find the light of pixels by sets of samples, as many as give all opened pixels the error wanted."""
         if not len(pixels):
             return
@@ -311,11 +379,11 @@ class Cells:
         low, high = -10.0, 10.0
         for _ in range(30):
             middle = (low + high) / 2
-            low_set, more_of = _between(np.maximum(2.0**middle * weights**spread, least))
+            low_set, more_of = _between(np.maximum(2.0**middle * weights**SPREAD, least))
             each = of_sets[low_set] * (1 - more_of) + of_sets[low_set + 1] * more_of
             more = np.sum(times * expected * each) > squares
             low, high = (middle, high) if more else (low, middle)
-        numbers = _numbers(np.maximum(2.0**high * weights**spread, least)[which])
+        numbers = _numbers(np.maximum(2.0**high * weights**SPREAD, least)[which])
         todo = np.ones(len(pixels), np.bool_)
         todo[pilots] = numbers[pilots] > sum(OF_PILOTS)
         self._sample(pixels[todo], numbers[todo])
@@ -391,6 +459,23 @@ def _rod(vertices: Floats) -> Floats:
         if radius > np.ptp(along) / 4:
             break
     return np.array([*(middle + along.min() * axis), *(middle + along.max() * axis), radius])
+
+
+def dense_mean(
+    sight: Sight, wanted: Edges, rows: slice, cols: slice, order: Whole, curve: Floats
+) -> tuple[Radiance, Whole] | None:
+    """Return what `edge_mean` does for a block of fine structure, without looking for edges; None for any other."""
+    n, m = np.mgrid[rows, cols]
+    k, l = sight.camera.lens_lattice.nearest(m, n)
+    lens = np.asarray(l, np.int64) * sight.camera.lenses[0] + np.asarray(k, np.int64)
+    cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, np.ones(lens.size, np.bool_))
+    chosen = (m // BLOCK + 4 * (n // BLOCK)) % BLOCKS == BLOCKS // 3
+    some = np.flatnonzero(chosen | (lens.size <= FEW))
+    if not cells.dense(some):
+        return None
+    inside = order.astype(np.int64)
+    cells.fill(some, inside)
+    return cells.sums[inside].astype(np.float32), cells.rays[inside] - 1
 
 
 def edge_mean(
