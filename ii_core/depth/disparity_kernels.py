@@ -54,7 +54,7 @@ def line_costs(views, labels, limit, lines, out, first, last):
                     sy, sx = -labels[d] * views.steps[n, 0], -labels[d] * views.steps[n, 1]
                     _add_differences(views.pixels, n, y, sy, sx, limit, rows, total[line], count[line])
             for x in range(width):
-                out[y, x, d] = _better_half(total, count, on, x, limit)
+                out[y, x, d] = np.uint16(_better_half(total, count, on, x, limit) + np.float32(0.5))
 
 
 @stage_kernel
@@ -306,7 +306,7 @@ def rivals(cost, total, apart, ratio, margin, first, last):
             other, least = np.float32(np.inf), np.float32(np.inf)
             for d in range(cost.shape[2]):
                 if abs(d - best) >= apart:
-                    other = min(other, cost[y, x, d])
-                    least = min(least, total[y, x, d])
-            ratio[y, x] = cost[y, x, best] / other if 0.0 < other < np.inf else np.float32(1.0)
-            margin[y, x] = least - total[y, x, best] if least < np.inf else np.float32(0.0)
+                    other = min(other, np.float32(cost[y, x, d]))
+                    least = min(least, np.float32(total[y, x, d]))
+            ratio[y, x] = np.float32(cost[y, x, best]) / other if 0.0 < other < np.inf else np.float32(1.0)
+            margin[y, x] = least - np.float32(total[y, x, best]) if least < np.inf else np.float32(0.0)

@@ -25,13 +25,14 @@ from .layers import FARTHEST, first_mm
 
 ndimage = Lazy("scipy.ndimage")
 Map = NDArray[np.float32]
+Costs = NDArray[np.uint16]  # in 16-bit codes
 Progress = Callable[[int, int, str], Any]
 
 # In 8-bit codes summed over R, G and B: the difference of another surface; prices of `pass_on`.
 OTHER_SURFACE, SLOPE, LEAP, ALIKE = 30.0, 60.0, 30.0, 25.0
 FEW_RANGES = 3.0  # labels of all disparities over the most labels, up to which none are searched
 STEP = 0.48  # px that neighbouring labels are apart in the farthest view of a half-line
-MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of costs are then 4 times the field
+MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of costs are then twice the field
 # The range of disparities: found in views of at most SEARCH_SIDE px, at MANY pixels whose costs within NOISE 8-bit
 # codes of the least span less than VALLEY px.
 SEARCH_SIDE, MANY, NOISE, VALLEY = 128, 16, 4.0, 2.0
@@ -223,18 +224,18 @@ def possible(camera: IICamera | None, most: float) -> tuple[float, float]:
     return max(-most, infinity), min(most, nearest)
 
 
-def costs(views: Views, labels: Map, workers: int | None) -> Map:
-    """Return the costs of labels at every pixel of the reference, means over 3×3 pixels, (H, W, labels)."""
+def costs(views: Views, labels: Map, workers: int | None) -> Costs:
+    """Return the costs of labels at every pixel of the reference, means over 3×3 pixels, (H, W, labels) of uint16."""
     height, width = views.pixels.shape[2:]
-    out = np.empty((height, width, labels.size), np.float32)
+    out = np.empty((height, width, labels.size), np.uint16)
     limit = np.float32(OTHER_SURFACE * CODES)
     run(workers, height, kernels.line_costs, views, labels, limit, len(DIRECTIONS), out)
     ndimage.uniform_filter(out, (3, 3, 1), output=out)
     return out
 
 
-def passed_on(views: Views, cost: Map, labels: Map, workers: int | None) -> Map:
-    """Return costs passed on along rows and columns, both ways."""
+def passed_on(views: Views, cost: Costs, labels: Map, workers: int | None) -> Costs:
+    """Return costs passed on along rows and columns, both ways: at most 4·(OTHER_SURFACE + LEAP) codes, 16 bits."""
     height, width = views.pixels.shape[2:]
     view = views.pixels[0].transpose(1, 2, 0).astype(np.float32)
     total = np.zeros_like(cost)
@@ -244,7 +245,7 @@ def passed_on(views: Views, cost: Map, labels: Map, workers: int | None) -> Map:
     return total
 
 
-def labelled(total: Map, labels: Map) -> Map:
+def labelled(total: Costs, labels: Map) -> Map:
     """Return the disparity of least cost, between labels by a parabola; NaN where all cost the same."""
     layer, fit = np.empty(total.shape[:2], np.int64), np.empty(total.shape[:2])
     choose(total, CODES / 100, layer, fit, 0, total.shape[0])

@@ -6,7 +6,7 @@ import pytest
 from ii_core import IICamera, IIPicture, depth_of_disparity, estimate_depth
 from ii_core.depth.all_views import disparity_of_views
 from ii_core.depth.around import half_lines, views_around
-from ii_core.depth.estimate import field_range, labels_between
+from ii_core.depth.estimate import CODES, OTHER_SURFACE, costs, field_range, labels_between, passed_on
 from ii_core.depth.points import view_points
 from ii_core.picture.assumed import with_assumed_camera
 
@@ -148,3 +148,16 @@ def test_refused_pictures():
         estimate_depth(IIPicture(np.zeros((16, 16, 3), np.uint8), (16, 16), (1, 1)))
     with pytest.raises(ValueError, match="views are 4×16 px: at least 8×8"):
         estimate_depth(IIPicture(np.zeros((32, 8, 3), np.uint8), (4, 16), (2, 2)))
+
+
+def test_sums_of_the_largest_costs_fit_in_16_bits():
+    """Black and white pixels at random: no label fits, every path pays for a leap."""
+    pixels = 255 * np.random.default_rng(1).integers(0, 2, (60, 60, 1), np.uint8).repeat(3, axis=2)
+    views = views_around(IIPicture(pixels, (12, 12), (5, 5)), (2, 2))
+    labels = np.linspace(-4, 4, 40, dtype=np.float32)
+    cost = costs(views, labels, 1)
+    cost[::2, :, ::2] = OTHER_SURFACE * CODES  # the most that a label costs
+    total = passed_on(views, cost, labels, 1)
+    wide = passed_on(views, cost.astype(np.float32), labels, 1)
+    assert total.dtype == np.uint16 and wide.max() > 32768
+    np.testing.assert_allclose(total, wide, atol=5)
