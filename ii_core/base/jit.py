@@ -21,6 +21,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.dispatcher import Dispatcher
+from numba.core.types import unliteral
 from numba.extending import intrinsic, overload
 
 
@@ -285,7 +286,14 @@ def _part(function: Callable[..., Any], compiler: type[_PartCompiler] = _PartCom
     compiled: Any = numba.njit(nogil=True, error_model="numpy", pipeline_class=compiler, **flags)(function)
     compiled.add_overload = lambda result: _keep(compiled, result)
     compiled._compile_for_args = lambda *_, **__: function
+    compiled.get_call_template = lambda arguments, keywords: _call_without_literals(compiled, arguments, keywords)
     return compiled
+
+
+def _call_without_literals(compiled: Any, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
+    """Resolve a call of a part: a number written in the call would compile a part of its own."""
+    plain = tuple(unliteral(kind) for kind in arguments)
+    return Dispatcher.get_call_template(compiled, plain, {name: unliteral(kind) for name, kind in keywords.items()})
 
 
 def late_kernel(function: Callable[..., Any]) -> Any:

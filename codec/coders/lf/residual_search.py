@@ -19,7 +19,6 @@ from .transform import LARGEST, forward, sides, size_of
 
 BEST = 2
 FIRST_BITS, OCTAVE_BITS = 4.5, 1.6  # of a coefficient of one step, and for each doubling, about
-ONE = np.int64(1)  # a literal number would compile a kernel of its own
 NOTHING = np.float32(0)
 BEYOND = np.float32(1.00001)  # times the least cost so far: more by far than sums of the same terms are rounded
 WORTH_SKIPPING = np.float32(1.2)  # times the least cost so far: beyond it, skipping the transform is not tried
@@ -151,7 +150,7 @@ def try_residual(costs, job, search, work, trial, y0, x0, shape, kind, so_far):
         shape,
     )
     limit = min(cost, useless)
-    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, ONE, limit, NOTHING)
+    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, 1, limit, NOTHING)
     if some and missed + search.weight * more < cost:
         trial.trial_skipped[0] = 1
         return more, missed, some
@@ -198,7 +197,7 @@ def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limi
             trial.trial_cross[p - 1] = cross
         if some:
             levels = work.spare if cross else work.levels
-            rows, cols = rebuild(work, levels, shape, job.step, ONE, cross, job.crossed, skipped, job.dependent)
+            rows, cols = rebuild(work, levels, shape, job.step, 1, cross, job.crossed, skipped, job.dependent)
             if p == 0:
                 keep_first(work, rows, cols)
                 first = 1
