@@ -8,7 +8,6 @@ input is a setting in JSON, the line of output its CPU seconds, and its PSNR in 
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import json
 import sys
 from collections.abc import Iterator
@@ -68,10 +67,12 @@ def _serve(scene: str, camera_json: str, cuts_json: str) -> None:
 
 def _first_of(*modules: str) -> Any:
     """Import the first module that the code has: earlier ones have others."""
-    for name in modules:
-        if importlib.util.find_spec(name.rpartition(".")[0]) and importlib.util.find_spec(name):
+    for name in modules[:-1]:
+        try:
             return importlib.import_module(name)
-    raise ModuleNotFoundError(f"none of {', '.join(modules)}")
+        except ModuleNotFoundError:
+            continue
+    return importlib.import_module(modules[-1])
 
 
 if __name__ == "__main__":
