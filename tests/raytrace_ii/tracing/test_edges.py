@@ -11,10 +11,11 @@ import pytest
 
 from ii_core import IICamera, IIPicture, preset, read_maps, write_maps
 from ii_core.base.colour import srgb
-from raytrace_ii import Light, Scene, render
+from raytrace_ii import Light, Scene, load_scene, render
 from raytrace_ii.rendering.render import render_to
 from raytrace_ii.scene.textures import Checker
 from raytrace_ii.shapes.primitives import Mesh
+from raytrace_ii.tracing.edges import SETS
 from raytrace_ii.tracing.support_images import name_hashes
 from tests.support.trace_scenes import BLACK, WHITE, body, hall, wall
 
@@ -140,6 +141,21 @@ def test_edges_are_the_same_bits_for_any_workers_and_kept_in_support(camera):
     assert (whole.picture.pixels[calm] == one.picture.pixels[calm]).mean() > 0.98
     for name in ("depth", "object_id"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(one, name))
+
+
+def test_tiles_of_fine_structure_have_the_sets_of_fixed_numbers():
+    """Two numbers in turn, and in the blocks that told, a ray more and pilots."""
+    scene, camera = load_scene("cuboid"), preset("setup1", scale=32)
+    shot = render(scene, camera, samples="edges", error=4.0, support=("samples",))
+    numbers, times = np.unique(shot.samples, return_counts=True)
+    two = np.sort(numbers[np.argsort(times)[-2:]])
+    assert two[0] in SETS
+    assert two[1] in (SETS[np.searchsorted(SETS, two[0]) + 1], two[0] + 1)
+    assert times.max() > 0.4 * shot.samples.size
+    for number in set(two.tolist()) & set(SETS.tolist()):
+        fixed, those = render(scene, camera, samples=number).picture.pixels, shot.samples == number
+        off = np.abs(fixed[those].astype(int) - shot.picture.pixels[those])
+        assert off.max() <= 1, "rounding of the mean alone"
 
 
 @pytest.mark.parametrize("side", [0.05, 0.1, 0.3, 0.7, 2.0])
