@@ -186,6 +186,7 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/depth_truth.*",)),
         Benchmark("accuracy.estimated_depth", records=OWN, fills=("docs/depth.md",),
             writes=(f"{IMAGES}/depth.webp",)),
+        Benchmark("accuracy.depth_confidence"),
         Benchmark("accuracy.depth_methods", needs="OpenCV, published fields: optional", records=OWN,
             fills=("docs/depth.md",), writes=(f"{IMAGES}/depth_methods.svg",)),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),

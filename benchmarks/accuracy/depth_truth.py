@@ -26,7 +26,7 @@ from benchmarks.records import Records, origin, table
 from codec import decode, encode
 from ii_core import IIPicture, add_sensor_noise, preset
 from ii_core.depth.focus import METHODS
-from ii_core.depth.virtual_camera import virtual_camera_pixels
+from ii_core.depth.layers import virtual_camera_pixels
 from ii_core.display.figure import COLOURS, new_figure
 from ii_core.picture.view import camera_of
 from metrics import DepthQuality, FocusDepth, depth_from_focus, linear_layers, q_depth

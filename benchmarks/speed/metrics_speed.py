@@ -20,7 +20,7 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, preset
-from ii_core.depth.virtual_camera import virtual_camera_pixels
+from ii_core.depth.layers import virtual_camera_pixels
 from ii_core.display.figure import COLOURS, MARKERS, new_figure, save
 from metrics import depth_from_focus, linear_layers, q_depth
 from raytrace_ii import Shot, load_scene, render

@@ -47,10 +47,13 @@ SETTLED, JUMP, LOWER = 1e5, 0.3, 3
 # moving reflection, a hidden edge, or rendering noise that all views share. On antinous of the HCI fields 15.4 % are
 # above 0.07 px with this rule, more than 20 % without (2026-11-25).
 AT_ODDS, BY_NOISE, SUDDEN = 0.003, 4.0, 8
-# Confidence: labels so many px away are rivals; logistic regression on 950 000 pixels of four fields of 9×9 views,
-# `cuboid`, `twins`, `apples` with noise of one code and antinous, its constant lowered by 0.3. Without the field that
-# it is tried on, of pixels above 0.9 are bad: cuboid 1.8, twins 1.8, antinous 2.4, apples 48 % (2026-11-25).
-APART, JUDGE = 0.5, (-3.26, -0.59, -0.15, -0.91, 0.74, -0.50, -0.84)
+# Confidence: labels so many px away are rivals. A pixel is right if the views agree and no rival does as well, the
+# product of two logistic terms: `JUDGES`. Few sure pixels among unsure ones are chance: a third term, `CROWD`, has
+# their mean over AROUND px. Fitted by `python -m benchmarks run depth_confidence` to 48 fields in closed form
+# (spheres, walls, bars, shadows, highlights), whose signs are kept, and to no other field (2026-11-26).
+APART, AROUND = 0.5, 31
+JUDGES = (0.49, -0.57, -0.94, -0.53), (-4.05, -0.36, -1.11, 1.09)
+CROWD = -2.19, 0.5, 4.61
 LOUD = 2 * OCCLUDED  # noise in codes from which no pixel is sure: all views then count as occluded
 # Even blocks from which noise is estimated: side in px, and their share.
 BLOCK, EVEN = 8, 0.1
@@ -158,11 +161,11 @@ def estimate_depth(
     for step in range(STEPS):
         told(3 + step, total, f"step {step + 1} over all views")
         settled = SETTLED * CODES**2 if step > 1 else np.inf
-        disparity, mean, odds = refined(views, disparity, noise, mean, settled, workers)
+        disparity, mean, odds, halves = refined(views, disparity, noise, mean, settled, workers)
     disparity = thinned(disparity)
     told(3 + STEPS, total, "confidence")
     disparity[np.isnan(start)] = np.nan
-    confidence = judged(disparity, start, ratio, margin, odds) / (1 + (noise / LOUD) ** SUDDEN)
+    confidence = judged(disparity, ratio, margin, odds, halves) / (1 + (noise / LOUD) ** SUDDEN)
     depth = None if picture.camera is None else depth_of_disparity(picture.camera, disparity)
     told(total, total, "")
     return DepthEstimate(disparity, confidence, depth, at)
@@ -265,26 +268,41 @@ def matched(views: Views, labels: Map, workers: int | None) -> tuple[Map, Map, M
     return np.asarray(ndimage.median_filter(labelled(total, labels), 3)), ratio, margin / CODES
 
 
-def judged(disparity: Map, start: Map, ratio: Map, margin: Map, odds: Map) -> Map:
+def judged(disparity: Map, ratio: Map, margin: Map, odds: Map, halves: Map) -> Map:
     """Return the estimated probability that disparities are within 0.07 px."""
     known = np.nan_to_num(disparity)
-    spread = ndimage.maximum_filter(known, 7) - ndimage.minimum_filter(known, 7)
-    terms = (
-        np.log(spread + 0.02),  # outlines, and noise
-        np.log(np.abs(known - np.nan_to_num(start)) + 0.005),  # steps after matching
-        np.log(np.clip(ratio, 0.05, 2)),
-        np.log(np.maximum(margin, 0) + 2),
-        np.log(odds + 0.1),  # quarters of the views, here
-        np.log(ndimage.maximum_filter(odds, 2 * RADIUS + 1) + 0.1),  # and in the window
-    )
-    sum_ = JUDGE[0] + sum(weight * term for weight, term in zip(JUDGE[1:], terms, strict=True))
-    return np.where(np.isnan(disparity), 0, 1 / (1 + np.exp(-sum_))).astype(np.float32)
+    both = _logistic(JUDGES[0], agreement(odds, halves)) * _logistic(JUDGES[1], rivalry(known, ratio, margin))
+    right = _logistic(CROWD, crowd(both))
+    return np.where(np.isnan(disparity), 0, right).astype(np.float32)
+
+
+def agreement(odds: Map, halves: Map) -> tuple[Map, ...]:
+    """Return what tells whether views agree: `at_odds` here and in the window, and halves."""
+    most = ndimage.maximum_filter(odds, 2 * RADIUS + 1)
+    return np.log(odds + 0.1), np.log(most + 0.1), np.log(halves + 0.003)
+
+
+def rivalry(disparity: Map, ratio: Map, margin: Map) -> tuple[Map, ...]:
+    """Return what tells whether another disparity does as well: spread of disparities, `rivals`."""
+    spread = ndimage.maximum_filter(disparity, 7) - ndimage.minimum_filter(disparity, 7)
+    return np.log(spread + 0.02), np.log(np.clip(ratio, 0.05, 2)), np.log(np.maximum(margin, 0) + 2)
+
+
+def crowd(right: Map) -> tuple[Map, ...]:
+    """Return the logit of a probability and its mean around each pixel."""
+    share = np.clip(right, 1e-4, 1 - 1e-4)
+    return np.log(share / (1 - share)), ndimage.uniform_filter(share, AROUND)
+
+
+def _logistic(weights: tuple[float, ...], terms: tuple[Map, ...]) -> Map:
+    sum_ = weights[0] + sum(weight * term for weight, term in zip(weights[1:], terms, strict=True))
+    return np.asarray(1 / (1 + np.exp(-sum_)))
 
 
 def refined(
     views: Views, disparity: Map, noise: float, mean: Map, settled: float, workers: int | None
-) -> tuple[Map, Map, Map]:
-    """Return the disparity after a Gauss–Newton step over all views, their mean there, and `at_odds`.
+) -> tuple[Map, Map, Map, Map]:
+    """Return the disparity after a Gauss–Newton step over all views, their mean there, and the two of `at_odds`.
 
     Gradients are of ``mean``, (3, H, W): those of one view have its noise, which makes steps too short. Where data
     weigh more than ``settled`` the disparity stays.
@@ -294,7 +312,7 @@ def refined(
     push, weight = (np.empty((4, height, width), np.float32) for _ in range(2))
     seen = np.empty_like(mean)
     run(workers, height, kernels.add_evidence, views, known, np.float32(OCCLUDED * CODES), mean, push, weight, seen)
-    odds = at_odds(push, weight, noise)
+    odds, halves = at_odds(push, weight, noise)
     out, sure = np.empty_like(known), np.empty_like(known)
     view = views.pixels[0].astype(np.float32)
     likeness = np.float32(SAME_COLOUR * CODES), np.float32(SAME_SURFACE)
@@ -302,7 +320,7 @@ def refined(
     run(workers, height, kernels.fit_planes, *evidence, RADIUS, *likeness, PRIOR * CODES**2, FLAT, out, sure)
     out = known + np.clip(out - known, -LONGEST, LONGEST) / (1 + np.minimum(odds, 100) ** SUDDEN)
     out = np.where(sure > settled, known, ndimage.median_filter(out, 3))
-    return out, seen, odds
+    return out, seen, odds, halves
 
 
 def thinned(disparity: Map) -> Map:
@@ -311,8 +329,11 @@ def thinned(disparity: Map) -> Map:
     return np.where(jump, ndimage.rank_filter(disparity, LOWER, 3), disparity)
 
 
-def at_odds(push: Map, weight: Map, noise: float) -> Map:
-    """Return by how much quarters of the views disagree over what is allowed, in windows of planes."""
+def at_odds(push: Map, weight: Map, noise: float) -> tuple[Map, Map]:
+    """Return by how much quarters of the views disagree over what is allowed, in windows of planes.
+
+    The second is the most that two disjoint halves of the views differ, px.
+    """
     side = 2 * RADIUS + 1
     pushes, weights = (ndimage.uniform_filter(part, (0, side, side)) * side**2 for part in (push, weight))
     heavy = np.maximum(weights, 1)
@@ -320,7 +341,15 @@ def at_odds(push: Map, weight: Map, noise: float) -> Map:
     away = pushes / heavy - pushes.sum(axis=0) / mass
     quarters = max(int((weight.sum(axis=(1, 2)) > 0).sum()) - 1, 1)
     spread = np.sqrt((heavy * away**2).sum(axis=0) / mass / quarters)
-    return np.asarray(spread / (AT_ODDS + BY_NOISE * np.sqrt(3 / mass) * noise * CODES))
+    odds = np.asarray(spread / (AT_ODDS + BY_NOISE * np.sqrt(3 / mass) * noise * CODES))
+    halves = np.zeros_like(odds)
+    for other in (1, 2, 3):
+        one = [q in (0, other) for q in range(4)]
+        steps = [
+            pushes[half].sum(axis=0) / np.maximum(weights[half].sum(axis=0), 1) for half in (one, np.invert(one))
+        ]
+        np.maximum(halves, np.abs(steps[0] - steps[1]), out=halves)
+    return odds, halves
 
 
 def noise_codes(views: Views) -> float:

@@ -1,8 +1,9 @@
-"""Depth layers, and the viewpoint of the virtual camera."""
+"""Depth layers, and the virtual camera of Q_depth: its viewpoint and the pixels that it sees."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import checks
 from ..camera.camera import IICamera
 from ..picture.disparity import depth_of_disparity, disparity_of_depth
+from ..picture.picture import IIPicture
+from ..picture.view import camera_of, view_positions
 
 LAYERS = 250
 FIELD_SPAN, FARTHEST = 16.0, 100.0  # pixels; distances at which viewing zones meet
@@ -165,3 +168,30 @@ def nearest_layer(z: Floats, layers_mm: Floats, gap_mm: float) -> NDArray[np.int
         edges = np.concatenate([[2 * layers_mm[0] - inner[0]], inner, [2 * layers_mm[-1] - inner[-1]]])
     row = np.searchsorted(edges, z, side="right") - 1
     return np.where(np.isnan(z) | (row >= layers_mm.size), -1, row)
+
+
+def virtual_camera_pixels(camera: IICamera, *, erect: bool = False) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return row and column of the pixel under each lens that the virtual camera sees.
+
+    Returns
+    -------
+    n, m : ndarray of int
+        They broadcast to (L, K), without the rows of lenses whose line misses the pixel array. Only arrays higher
+        than wide have such rows.
+    """
+    n, m, _ = seen_pixels(camera, erect)
+    return n, m
+
+
+def view_of(picture: IIPicture) -> NDArray[Any]:
+    """Return the view of the virtual camera: one pixel of the picture per lens, (L', K, 3)."""
+    n, m = virtual_camera_pixels(camera_of(picture), erect=picture.erect)
+    return picture.pixels[n, m]
+
+
+def seen_pixels(camera: IICamera, erect: bool) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return `virtual_camera_pixels` and the indices of the remaining lens rows."""
+    x, y = view_positions(camera, virtual_viewpoint(camera), erect=erect)
+    m, n = (np.floor(position + 0.5).astype(np.int64) for position in (x, y))
+    kept = np.flatnonzero((n >= 0) & (n < camera.pixels[1]))
+    return n[kept, None], m[None, :], kept

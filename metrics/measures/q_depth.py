@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IIPicture
 from ii_core.base import checks
 from ii_core.depth.focus import METHODS, FocusDepth, depth_from_focus
-from ii_core.depth.layers import check_layers, nearest_layer
-from ii_core.depth.virtual_camera import seen_pixels
+from ii_core.depth.layers import check_layers, nearest_layer, seen_pixels
 from ii_core.picture.view import camera_of
 
 from .global_angle import psnr

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ii_core import IIPicture
 from ii_core.base import checks
-from ii_core.depth.virtual_camera import view_of
+from ii_core.depth.layers import view_of
 from ii_core.display.figure import new_figure, save
 from ii_core.picture.picture import peak
 

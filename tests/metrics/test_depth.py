@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture, orthoscopic, view_image
-from ii_core.depth.virtual_camera import virtual_camera_pixels
+from ii_core.depth.layers import virtual_camera_pixels
 from metrics import covering_layers, depth_from_focus, linear_layers, logarithmic_layers, q_depth, report
 
 GAP = 1.5

@@ -10,9 +10,8 @@ import pytest
 from ii_core import IICamera, IIPicture, orthoscopic, preset
 from ii_core.depth.focus import BASE, FILTER, REFERENCE
 from ii_core.depth.focus_kernels import Star, Tables, choose, focus_cost, half_cost, judge, pass_on, weigh
-from ii_core.depth.layers import nearest_layer
+from ii_core.depth.layers import nearest_layer, virtual_camera_pixels
 from ii_core.depth.lens_tables import NOWHERE, pixel_tables, pixels_per_lens, star, whole_pixel_steps
-from ii_core.depth.virtual_camera import virtual_camera_pixels
 from metrics import depth_from_focus, linear_layers, logarithmic_layers, q_depth
 from raytrace_ii import Scene, render
 from raytrace_ii.scene.textures import Image
