@@ -43,7 +43,7 @@ def field(seed: int, side: int, views: int) -> tuple[IIPicture, Array]:
     """Return a field and the disparity of its middle view: z = 1 is `span` px a step before infinity."""
     draw = np.random.default_rng(seed)
     focal, span, half = 1.5 * side, draw.choice([1.5, 4.0, 8.0]), views // 2
-    draw.uniform(-span, span * 0.3)
+    draw.uniform()  # of no use, but the weights in the code are those of the fields that follow it
     infinity, base = draw.uniform(-span * 0.5, 0.0) - span * 0.2, 1.5 * span / focal
     shade = scene(draw)
     y, x = np.mgrid[:side, :side].astype(float)
