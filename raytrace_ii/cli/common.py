@@ -51,16 +51,27 @@ Workers = Annotated[int | None, typer.Option(help="Number of threads; the number
 
 
 def load_any(path: Path) -> IIPicture:
-    """Return an II-picture from its file or from a coded file."""
+    """Return an II-picture from its file or from a coded file.
+
+    Raises
+    ------
+    ValueError
+        If the file is neither.
+    """
     from ii_core import IIPicture
     from ii_core.base.files import IMAGE_TYPES, check_file
 
-    if path.suffix in IMAGE_TYPES:
+    if path.suffix.lower() in IMAGE_TYPES:
         return IIPicture.load(path)
     from codec import decode
 
     check_file(path)
-    return decode(path)
+    try:
+        return decode(path)
+    except ValueError as error:
+        if path.suffix == ".ii":
+            raise
+        raise ValueError(f"{error}; names of pictures end in {', '.join(IMAGE_TYPES)}") from None
 
 
 def with_camera(picture: IIPicture, name: str, angle_deg: float | None = None) -> IIPicture:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -16,7 +17,7 @@ from .common import Force, Workers, app, check_outputs, check_unused, columns, l
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, spinner
 from .tables import print_table
-from .words import say
+from .words import one_line, say
 
 if TYPE_CHECKING:
     from ii_core import IIPicture
@@ -120,14 +121,26 @@ def measure(
         if json:
             write_json(json, {"reference": str(reference), "decoded": str(decoded), **made.numbers})
     columns(made.rows)
+    if _is_bare(decoded):  # anything of this size is compared, a picture of depths as well
+        print(
+            f"note: {one_line(str(decoded))} has no sidecar: the structure of the reference is taken", file=sys.stderr
+        )
+
+
+def _is_bare(path: Path) -> bool:
+    """Whether a picture has no sidecar."""
+    from ii_core.base.files import IMAGE_TYPES
+    from ii_core.picture.picture import sidecar
+
+    return path.suffix.lower() in IMAGE_TYPES and not sidecar(path).exists()
 
 
 def _judged(path: Path, reference: IIPicture) -> IIPicture:
     """Return the decoded picture; without a sidecar it has the structure of the reference."""
-    from ii_core.base.files import IMAGE_TYPES, image_header, read_image
+    from ii_core.base.files import image_header, read_image
     from ii_core.picture.picture import sidecar
 
-    if path.suffix not in IMAGE_TYPES or sidecar(path).exists():
+    if not _is_bare(path):
         return load_any(path)
     shape, _ = image_header(path)
     if shape != reference.pixels.shape:

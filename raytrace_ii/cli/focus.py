@@ -189,7 +189,7 @@ def _pupil(text: str, views: tuple[int, int]) -> Any:
     from ii_core.depth.refocus import pupil_weights
     from ii_core.picture.picture import peak
 
-    if Path(text).suffix in IMAGE_TYPES:
+    if Path(text).suffix.lower() in IMAGE_TYPES:
         from PIL import Image
 
         given = read_image(Path(text))

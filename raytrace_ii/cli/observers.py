@@ -101,7 +101,7 @@ def _stimuli(paths: list[Path], measures: str | None) -> list[Stimulus]:
     made: list[Stimulus] = []
     reference: IIPicture | None = None
     for path in paths:
-        if path.suffix in IMAGE_TYPES:
+        if path.suffix.lower() in IMAGE_TYPES:
             reference = IIPicture.load(path)
             names = _possible(reference) if measures is None else [] if measures == "none" else measures.split(",")
             measure = measuring(reference, names)

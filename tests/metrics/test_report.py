@@ -167,10 +167,16 @@ def test_the_command_names_missing_measures_and_accepts_bare_pictures(run, refus
     a = picture()
     a.save(tmp_path / "a.png")
     write_image(tmp_path / "b.png", worse(a).pixels)  # no sidecar
-    code, out, _ = run("measure", tmp_path / "a.png", tmp_path / "b.png", "--json", tmp_path / "m.json", "--ssim")
+    code, out, told = run("measure", tmp_path / "a.png", tmp_path / "b.png", "--json", tmp_path / "m.json", "--ssim")
     assert code == 0 and "MS-SSIM" in out
+    assert told.endswith("b.png has no sidecar: the structure of the reference is taken\n")
     kept = json.loads((tmp_path / "m.json").read_text())
     assert kept["q_global"] == q_global(a, worse(a)) and "ms_ssim" in kept["missing"]
+    a.save(tmp_path / "upper.PNG")
+    code, out, told = run("measure", tmp_path / "a.png", tmp_path / "upper.PNG")
+    assert code == 0 and not told
+    (tmp_path / "x.csv").write_text("1,2")
+    refused(run("measure", tmp_path / "a.png", tmp_path / "x.csv"), "names of pictures end in .png, .tif")
     write_image(tmp_path / "c.png", worse(a).pixels[4:])
     refused(run("measure", tmp_path / "a.png", tmp_path / "c.png"), "c.png has no sidecar c.png.json, and 56×44 px")
 
