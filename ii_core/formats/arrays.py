@@ -14,6 +14,7 @@ D. Dansereau's Light Field Toolbox. S. Wanner et al., "Datasets and benchmarks f
 from __future__ import annotations
 
 import math
+import mmap
 import os
 import warnings
 from collections.abc import Callable
@@ -37,6 +38,7 @@ h5py, matlab = Lazy("h5py"), Lazy("scipy.io")
 ARRAYS = (".mat", ".h5", ".hdf5")
 NAME, STRUCTURE, DEPTH = "LF", "structure", "GT_DEPTH"
 HDF5 = b"\x89HDF\r\n\x1a\n"
+HEAP = b"GCOL\x01\0\0\0"  # a collection of texts of any length in HDF5
 MATLAB_5 = b"MATLAB 5.0 MAT-file".ljust(116)  # the text that such a file begins with
 MATLAB_73 = 512  # bytes of text before the HDF5 of MATLAB's version 7.3
 MOST_MATLAB = 2**31 - 1  # bytes of a variable of version 5
@@ -188,6 +190,21 @@ def _dataset(file: Any, name: str) -> Any:
     return found
 
 
+def _check_heaps(path: Path) -> None:
+    """Walk the heaps that hold texts as HDF5's library does: an object of no size keeps it there for ever."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        start = -1
+        while (start := data.find(HEAP, start + 1)) >= 0:
+            at, end = start + 16, start + int.from_bytes(data[start + 8 : start + 16], "little")
+            while at + 16 <= min(end, len(data)):
+                free = not any(data[at : at + 2])
+                size = int.from_bytes(data[at + 8 : at + 16], "little")
+                step = size if free else 16 + -(-size // 8) * 8
+                if not 16 <= step <= end - at:
+                    raise ValueError(f"an object of {size} bytes in the heap of its texts at byte {start}")
+                at += step
+
+
 def _hdf5(path: Path) -> Stored:
     file = _opened(path)
     try:
@@ -196,6 +213,8 @@ def _hdf5(path: Path) -> Stored:
         if len(found) != 1:
             raise ValueError(f"it holds {len(found)} arrays of four or five axes: one, named {NAME}, is needed")
         data = found[0]
+        if STRUCTURE in data.attrs:
+            _check_heaps(path)
         text = data.attrs.get(STRUCTURE)
         turned = path.suffix.lower() == ".mat" and text is None
         keys = ("dH", "focalLength", "shift")

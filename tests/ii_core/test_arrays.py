@@ -132,6 +132,23 @@ def test_what_leads_out_of_the_file_or_is_no_light_field_is_refused(tmp_path, ki
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("size", [0, 8, 1 << 40, (1 << 64) - 16])
+@pytest.mark.parametrize("number", [0, 7])
+def test_a_heap_of_texts_that_hdf5_would_not_leave_is_told(tmp_path, number, size):
+    """Its library steps over a heap's objects by their sizes: sizes of 0 keep it at one of them for ever."""
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["LF"] = field()
+        file["LF"].attrs["structure"] = "{}"
+    data = bytearray(path.read_bytes())
+    free = data.index(b"GCOL") + 16 + 16 + 8  # behind the heap's head, the head of its one object and the padded text
+    data[free : free + 2] = number.to_bytes(2, "little")
+    data[free + 8 : free + 16] = size.to_bytes(8, "little")
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match=r"a\.h5 is no light field: an object of \d+ bytes in the heap"):
+        find_views(path)
+
+
 def test_a_pickle_in_a_matlab_file_is_not_loaded(tmp_path):
     """Objects and functions of MATLAB are listed, never made."""
     scipy.io.savemat(tmp_path / "a.mat", {"LF": np.array([{"a": 1}], object).reshape(1, 1, 1, 1)})
