@@ -25,6 +25,7 @@ SIDE_WORK = (
     "benchmarks.records",
     "benchmarks.registry",
     "benchmarks.arguments",
+    "ii_core.base.jit",  # how kernels are compiled and cached, not what they compute
 )  # measure nothing
 
 
