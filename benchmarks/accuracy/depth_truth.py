@@ -152,12 +152,17 @@ def tell_apart(scene: Scene, shot: Shot) -> NDArray[np.int64]:
     edge = maximum_filter(far, 3) > 1.2 * minimum_filter(far, 3)
     luma = shot.picture.pixels.astype(np.float32) @ np.float32([0.299, 0.587, 0.114])
     flat = (maximum_filter(luma, 3) - minimum_filter(luma, 3))[index] < 3
+    mirror, clear = (part[index] for part in mirrors_and_glass(scene, shot))
+    return np.select([clear, mirror, edge, flat], [4, 3, 2, 1], 0)
+
+
+def mirrors_and_glass(scene: Scene, shot: Shot) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which pixels see a reflecting and a transmitting body."""
     body = {body.name: body.material for body in scene.bodies}
     materials = [body[name] for name in shot.object_names]
-    seen = shot.object_id[index]
-    mirror = np.array([max(m.mirror) > 0 for m in materials] + [False])[seen]  # the last entry: no hit
-    clear = np.array([max(m.transmission) > 0 for m in materials] + [False])[seen]
-    return np.select([clear, mirror, edge, flat], [4, 3, 2, 1], 0)
+    mirror = np.array([max(m.mirror) > 0 for m in materials] + [False])  # the last entry: no hit
+    clear = np.array([max(m.transmission) > 0 for m in materials] + [False])
+    return mirror[shot.object_id], clear[shot.object_id]
 
 
 def quality(shot: Shot, found: dict[str, tuple[FocusDepth, float]]) -> dict[str, Any]:
