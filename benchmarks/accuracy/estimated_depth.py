@@ -213,7 +213,7 @@ def psnr(error: np.ndarray) -> float:
 
 @lru_cache(maxsize=1)
 def shot_of(scene: str, camera: IICamera) -> tuple[IIPicture, np.ndarray, np.ndarray]:
-    """Return a render of 16 samples a pixel, and what rays through the middles meet: z, and if it is mirror or glass."""
+    """Return a render of 16 samples a pixel; of rays through the middles, z and which meet mirrors or glass."""
     made = load_scene(scene)
     centre = render(made, camera, samples=1, support=("depth", "object_id"))
     assert centre.depth is not None
