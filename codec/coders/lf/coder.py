@@ -17,7 +17,7 @@ from ii_core import IIPicture
 from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
-from . import arithmetic, denoise, loop_filter_search, planes, ranges, search, stream, synthesis, tuning
+from . import arithmetic, denoise, loop_filter_search, planes, ranges, rig, rig_search, search, stream, synthesis, tuning
 from .blocks import MOST_REFERENCES, Job, Work, code_blend, code_view, new_work, zeros
 from .contexts import Contexts
 from .field import Field
@@ -252,6 +252,12 @@ class Source:
         else:
             self.axes = colours = planes.detail_axes(self.pixels, self.grid)
         low, high, lattice = ranges.estimated(self.view, self.grid, skewed=not exact)
+        self.rig, entries = None, None
+        if not exact:
+            entries = rig_search.departures(self.view, self.grid, lattice, (low, high))
+        if entries is not None:
+            self.rig = rig.rig(entries, *self.view(0, 0).shape[1:])
+            low, high = ranges.moved_range(self.view, self.grid, lattice, self.rig)
         self._target_of: Any = None
         self._latest_target = np.zeros((3, 0, 0), np.int16)
         self.header = Header(
@@ -270,6 +276,7 @@ class Source:
             dependent=not exact,
             directed=not exact,
             parted=not exact,
+            rig=b"" if entries is None else rig.pack(entries, self.grid[0] // 2 * self.grid[1] + self.grid[1] // 2),
             steps=(),
         )
 
@@ -445,7 +452,7 @@ class Source:
             return self.view(*place)
         key, limits = (place, header.steps, header.scales), (header.low, header.high)
         if self._target_of != key:  # the first view is coded twice
-            found = denoise.denoised(self.view, self.grid, place, header.lattice, limits, header.steps[-1])
+            found = denoise.denoised(self.view, self.grid, place, header.lattice, limits, header.steps[-1], self.rig)
             self._target_of, self._latest_target = key, found
         return self._latest_target
 

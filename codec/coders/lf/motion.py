@@ -14,7 +14,7 @@ from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel, tuned_kerne
 from . import contexts as at
 from .arithmetic import bit_cost, code_bit, code_number, number_cost
 from .transform import sides, size_of
-from .warp import clamped, lead, moved_block
+from .warp import clamped, led, moved_block
 
 MOST_PAST = 4  # earlier instants
 QUARTER = 64  # of a sample, in 2^-8
@@ -76,8 +76,8 @@ def inherited(job, by, bx, shape):
     y, x = 4 * by + (h >> 1), 4 * bx + (w >> 1)
     if job.synthesised:
         d = np.int64(job.disparity[y, x])
-        x += (lead(d, job.references[0, 1]) + 128) >> 8
-        y += (lead(d, job.references[0, 2]) + 128) >> 8
+        dy, dx = led(job.references, 0, d, y, x, job.views.shape[2:])
+        y, x = y + ((dy + 128) >> 8), x + ((dx + 128) >> 8)
     j, i = clamped(y >> 2, height), clamped(x >> 2, width)
     view = job.references[0, 0]
     return noted(job, view, j, i), 1 + np.int64(job.motions[view, IN_TIME, j, i])
