@@ -7,7 +7,6 @@ filtering, ICIP 2020). Noise of a view predicts no other view, and costs most bi
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +67,8 @@ def denoised(
     near.sort(key=lambda other: (abs(other[0] - row) + abs(other[1] - col), other))
     views, references = np.stack([view(*other) for other in near]), offsets(place, near, lattice, grid, rig)
     first, last = limits[0] // UNIT, -(-limits[1] // UNIT)
-    disparity = UNIT * (first + over_squares(cell_errors(view, grid, place, lattice, (first, last), rig)).argmin(axis=0))
+    errors = over_squares(cell_errors(view, grid, place, lattice, (first, last), rig))
+    disparity = UNIT * (first + errors.argmin(axis=0))
     moved = np.empty((len(near), *original.shape), np.int16)
     misfits = np.empty((len(near), *disparity.shape))
     fits = []

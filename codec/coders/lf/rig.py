@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from ii_core.base.jit import lean_kernel
 
 from .arithmetic import code_number, code_raw, finish, new_contexts, overrun, reader, writer
-from .pyramid import Place
 from .transform import LARGEST
 
 FIELDS = 8

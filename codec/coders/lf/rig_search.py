@@ -1,8 +1,8 @@
-"""Encoder's estimate of where the views of a light field really are.
+"""Encoder's estimate of how far the views of a light field depart from their places on the lattice (`rig`).
 
-All views are registered to the middle one: its disparity by cells of 4×4 samples, and each view's entry of `rig`, are
-improved in turns by least squares of the differences of luma (Lucas and Kanade), weighted for outliers by Cauchy's
-function.
+All views are registered to the middle one. The disparity of its cells of 4×4 samples and the entries of the views are
+improved in turns by least squares of differences of luma (Lucas and Kanade 1981), weighted against outliers by
+Cauchy's function.
 """
 
 from __future__ import annotations
@@ -12,131 +12,130 @@ from numpy.typing import NDArray
 
 from ii_core.base.jit import array_kernel
 
-from . import rig
 from .ranges import FAR, MARGIN, UNIT, Lattice, Views, cell_errors, offsets, over_squares
-from .rig import FIELDS, PLACE_UNIT, SHIFT_UNIT
+from .rig import FIELDS, MOST, PLACE_UNIT, SHIFT_UNIT
 from .stream import UPRIGHT
 
-# Turns on views that are smoothed so many times by (1, 2, 1) / 4 across and down.
+# Turns with views that are smoothed so many times by (1, 2, 1) / 4 across and down.
 TURNS, SMOOTHINGS = 4, (6, 2, 1)
-SAMPLES = 1 << 23  # of all views that are compared, about: those of every so many-th row and column
-OUTLYING = 1.5  # times the median of the differences: half as much weight
-MOST_STEP = 48 / 256  # of a cell's disparity in a turn, in samples
-PRIOR = 0.02  # squared samples by which positions of cameras are held, against shifts
-OVERLAPPING = 0.25  # of a view's shorter side: no thing lies farther beside itself in any two views
-WORTH = 0.93  # views are moved if differences fall to this part
+SAMPLES, MOST_APART = 1 << 23, 4  # of all views that are compared, about: of every so many-th row and column, at most
+OUTLYING, LEAST_OUTLYING = 1.5, 4.0  # times the median of differences, and added: a difference with half the weight
+MOST_MOVE = 48 / 256  # of a cell's disparity in a turn, in samples
+# Of an entry and of disparity, the part of their curvature by which steps are damped.
+DAMPING, DAMPING_OF_CELLS = 1e-3, 0.02
+# Where disparity hardly varies, a camera beside its place and a shifted picture look alike: places are held as if
+# there were so much disparity more, in squared samples.
+HELD = 0.02
+OVERLAPPING = 0.25  # of a view's shorter side: disparity from the middle to the outermost view must not lead farther
+WORTH = 0.93  # a table is written if differences fall to this part
 _UNITS = np.array([PLACE_UNIT / UPRIGHT] * 2 + [SHIFT_UNIT / 256] * 6)
 
 
 def departures(
     view: Views, grid: tuple[int, int], lattice: Lattice, limits: tuple[int, int]
 ) -> NDArray[np.int64] | None:
-    """Return the table of entries, (J, `FIELDS`) as in `rig`; None if views fit about as well on the lattice."""
-    farthest = max(grid) // 2 * max(-limits[0], limits[1]) / 256
-    if max(-limits[0], limits[1]) - MARGIN < FAR or farthest > OVERLAPPING * min(view(0, 0).shape[1:]):
+    """Return the entries of all views, (J, `FIELDS`); None if views fit about as well without.
+
+    Parameters
+    ----------
+    view : callable
+        Planes (3, H, W) of the view at (row, column).
+    grid : (int, int)
+        Rows and columns of views.
+    lattice : (int, int, int)
+        As in the header.
+    limits : (int, int)
+        Least and greatest disparity, in 2^-8 samples.
+    """
+    reach = max(-limits[0], limits[1]) - MARGIN
+    if reach < FAR or max(grid) // 2 * reach > OVERLAPPING * 256 * min(view(0, 0).shape[1:]):
         return None
     registration = _Registration(view, grid, lattice, limits)
-    before = registration.alone()
-    found = registration.together()
-    return found if found.any() and registration.misfit(found) < WORTH * before else None
+    before = registration.without_entries()
+    entries = registration.entries_found()
+    return entries if entries.any() and registration.misfit(entries) < WORTH * before else None
 
 
 class _Registration:
-    """Views on their way to their places."""
+    """Views and their differences from the middle one."""
 
     def __init__(self, view: Views, grid: tuple[int, int], lattice: Lattice, limits: tuple[int, int]) -> None:
-        rows, cols = grid
-        self.middle = rows // 2 * cols + cols // 2
-        places = [divmod(at, cols) for at in range(rows * cols)]
+        places = [divmod(at, grid[1]) for at in range(grid[0] * grid[1])]
+        self.middle = grid[0] // 2 * grid[1] + grid[1] // 2
+        self.others = [at for at in range(len(places)) if at != self.middle]
         self.luma = np.stack([view(*place)[0] for place in places]).astype(np.float32)
-        self.views: NDArray[np.float32] = self.luma
-        middle = places[self.middle]
-        self.leads = offsets(middle, places, lattice, grid)[:, 1:] / UPRIGHT
+        self.views = self.luma
+        self.leads = offsets(places[self.middle], places, lattice, grid)[:, 1:] / UPRIGHT
         first, last = limits[0] // UNIT, -(-limits[1] // UNIT)
-        errors = over_squares(cell_errors(view, grid, middle, lattice, (first, last)))
+        errors = over_squares(cell_errors(view, grid, places[self.middle], lattice, (first, last)))
         self.start = (first + errors.argmin(axis=0)) * (UNIT / 256)
         self.disparity = self.start
-        self.every = max(1, min(4, round((self.luma.size / SAMPLES) ** 0.5)))
+        self.every = min(max(1, round((self.luma.size / SAMPLES) ** 0.5)), MOST_APART)
         self.entries = np.zeros((len(places), FIELDS))
+        self.scales = self.limits = np.ones(len(places))  # differences with half the weight, and three times these
 
-    def alone(self) -> float:
+    def without_entries(self) -> float:
         """Improve disparity alone; return the misfit."""
-        for count in SMOOTHINGS:
-            self._smooth(count)
-            for _ in range(TURNS):
-                self._turn(False)
-        self.first = self.scales
+        self._improve(False)
+        self.limits = 3 * self.scales
         return self.misfit(np.zeros(self.entries.shape, np.int64))
 
-    def together(self) -> NDArray[np.int64]:
-        """Improve disparity and entries; return these in whole units."""
+    def entries_found(self) -> NDArray[np.int64]:
+        """Improve disparity, from the start, and entries; return these in whole units."""
         self.disparity = self.start
-        for count in SMOOTHINGS:
-            self._smooth(count)
-            for _ in range(TURNS):
-                self._turn(True)
+        self._improve(True)
         found: NDArray[np.int64] = np.rint(self.entries / _UNITS).astype(np.int64)
-        return np.clip(found, -rig.MOST, rig.MOST)
+        return np.clip(found, -MOST, MOST)
 
     def misfit(self, entries: NDArray[np.int64]) -> float:
-        """Return the sum of differences, each at most thrice those of outliers."""
+        """Return the sum of differences, which count up to their view's limit."""
         total = 0.0
-        for at in range(len(self.views)):
-            if at != self.middle:
-                errors = self._register(at, entries[at] * _UNITS)[0]
-                total += float(np.minimum(np.abs(errors), 3 * self.first[at]).sum())
+        for at in self.others:
+            differences = self._register(at, entries[at] * _UNITS)[0]
+            total += float(np.minimum(np.abs(differences), self.limits[at]).sum())
         return total
 
+    def _improve(self, moving: bool) -> None:
+        for count in SMOOTHINGS:
+            self.views = _smoothed(self.luma, count)
+            for at in self.others:
+                differences = self._register(at, self.entries[at])[0]
+                self.scales[at] = OUTLYING * float(np.median(np.abs(differences))) + LEAST_OUTLYING
+            for _ in range(TURNS):
+                self._turn(moving)
+
     def _turn(self, moving: bool) -> None:
+        """Take a step of the cells' disparity, and of the entries if these are moving."""
         tops, bottoms = (np.zeros(self.disparity.shape) for _ in range(2))
-        for at in range(len(self.views)):
-            if at != self.middle:
-                _, squares, side, top, bottom = self._register(at, self.entries[at])
-                if moving:
-                    damped = squares + np.diag(1e-3 * np.diag(squares) + 1e-6)
-                    damped[(0, 1), (0, 1)] += PRIOR * np.diag(squares)[2:4]
-                    side[:2] -= PRIOR * np.diag(squares)[2:4] * self.entries[at, :2]
-                    self.entries[at] += np.linalg.solve(damped, side)
-                tops += top
-                bottoms += bottom
-        step = over_squares(tops[None])[0] / (over_squares(bottoms[None])[0] * 1.02 + 1e-6)
-        self.disparity = self.disparity + np.clip(step, -MOST_STEP, MOST_STEP)
+        for at in self.others:
+            _, squares, side, top, bottom = self._register(at, self.entries[at])
+            tops, bottoms = tops + top, bottoms + bottom
+            if moving:
+                held = HELD * np.diag(squares)[2:4]
+                side[:2] -= held * self.entries[at, :2]
+                squares += np.diag(DAMPING * np.diag(squares) + 1e-6)
+                squares[(0, 1), (0, 1)] += held
+                self.entries[at] += np.linalg.solve(squares, side)
+        step = over_squares(tops[None])[0] / ((1 + DAMPING_OF_CELLS) * over_squares(bottoms[None])[0] + 1e-6)
+        self.disparity = self.disparity + np.clip(step, -MOST_MOVE, MOST_MOVE)
         if moving:
             self._settle()
 
     def _settle(self) -> None:
-        """Give to disparity what it can explain alone: a factor of it, and a plane that is added to it."""
-        leads = self.leads.ravel()
-        for fields in ((0, 1), (2, 3), (4, 6), (5, 7)):
-            share = leads @ self.entries[:, fields].ravel() / (leads @ leads)
-            self.entries[:, fields] -= share * self.leads
-            if fields == (0, 1):
-                self.disparity = self.disparity * (1 + share)
-            else:
-                self.disparity = self.disparity + share * self._along(fields)
-
-    def _along(self, fields: tuple[int, int]) -> NDArray[np.float64] | float:
-        """Return by what growth is multiplied, at each cell; 1 for shifts."""
+        """Give to disparity what it can explain alone: a factor of it, a constant, and slopes across and down."""
         height, width = self.luma.shape[1:]
-        rows, cols = (4 * np.arange(side // 4) + 1.5 for side in (height, width))
-        if fields == (4, 6):
-            return (2 * cols - width)[None, :] / max(height, width)
-        return (2 * rows - height)[:, None] / max(height, width) if fields == (5, 7) else 1.0
+        rows, cols = ((8 * np.arange(side // 4) + 3 - side) / max(height, width) for side in (height, width))
+        for fields, by in (([0, 1], self.disparity), ([2, 3], 1.0), ([4, 6], cols), ([5, 7], rows[:, None])):
+            share = (self.leads * self.entries[:, fields]).sum() / (self.leads**2).sum()
+            self.entries[:, fields] -= share * self.leads
+            self.disparity = self.disparity + share * by
 
-    def _register(self, at: int, entry: NDArray[np.float64]) -> tuple[NDArray, ...]:
-        return _registered(
-            self.views[self.middle], self.views[at], self.disparity, self.leads[at], entry, self.every, self._scale(at)
+    def _register(self, at: int, entry: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        middle, other, lead = self.views[self.middle], self.views[at], self.leads[at]
+        found: tuple[NDArray[np.float64], ...] = _registered(
+            middle, other, self.disparity, lead, entry, self.every, self.scales[at]
         )
-
-    def _scale(self, at: int) -> float:
-        return self.scales[at]
-
-    def _smooth(self, count: int) -> None:
-        self.views = _smoothed(self.luma, count)
-        self.scales = np.ones(len(self.views))
-        for at in range(len(self.views)):
-            errors = self._register(at, self.entries[at])[0]
-            self.scales[at] = OUTLYING * float(np.median(np.abs(errors))) + 4.0
+        return found
 
 
 def _smoothed(views: NDArray[np.float32], count: int) -> NDArray[np.float32]:
@@ -144,7 +143,7 @@ def _smoothed(views: NDArray[np.float32], count: int) -> NDArray[np.float32]:
         for axis in (1, 2):
             sides = [(0, 0), (int(axis == 1),) * 2, (int(axis == 2),) * 2]
             padded, n = np.pad(views, sides, mode="edge"), views.shape[axis]
-            views = (padded.take(range(n), axis) + 2 * views + padded.take(range(2, n + 2), axis)) / 4
+            views = np.float32(0.25) * (padded.take(range(n), axis) + 2 * views + padded.take(range(2, n + 2), axis))
     return views
 
 
@@ -187,4 +186,4 @@ def _registered(middle, other, disparity, lead, entry, every, scale):
     for k in range(8):
         for m in range(k):
             squares[m, k] = squares[k, m]
-    return errors[:number], squares, right, tops, bottoms
+    return errors[: max(number, 1)], squares, right, tops, bottoms

@@ -13,9 +13,11 @@ from ...bitstream.compact import leb128, read_leb128
 from .planes import bt709_colours
 
 # Versions 2, 3, 5 and 6 say by their number which tools they have: factors between planes, and residuals without a
-# transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent
-# quantiser as well, version 9 other intra modes, too, version 10 halved blocks, version 11 views beside their places; lossless coding still writes 2 and 3.
-VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED, TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED = 3, 2, 5, 6, 7, 8, 9, 10, 11
+# transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent quantiser as well,
+# version 9 other intra modes, too, version 10 halved blocks, version 11 views beside their places. It is written for
+# these alone; lossless coding still writes 2 and 3.
+VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED = 3, 2, 5, 6
+TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED = 7, 8, 9, 10, 11
 FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED
 _VERSIONS = {
     (False, False): UNCROSSED,
