@@ -20,9 +20,6 @@ LARGE, SMALL = 4, 2  # blocks of 4×4 a side that are matched as one, a cell
 DISTINCT = 0.5  # the error at the best disparity is at most this part of the median over all,
 # and disparities of up to 1.5 times that error lie within so many units, by size: those of flat sky do not.
 ALIKE, NARROW = 1.5, {LARGE: 8 * 256 // UNIT, SMALL: 2 * 256 // UNIT}
-# Cells that match by chance are everywhere in the range: this part of all does not count at either end, if the range
-# then shrinks to that part. Of *tarot*, ±32 samples became −11 to +13.
-STRAY, STRAYING = 0.002, 0.75
 MARGIN = 128  # half a sample
 # Lattices are compared if disparities reach so far: 1.5 samples. Another one is taken if it fits so much better.
 FAR, WORTH_SKEWING = 384, 0.9
@@ -82,18 +79,8 @@ def _range(
     distinct = np.concatenate(best) - len(errors) // 2
     if not len(distinct):
         return -UNIT, UNIT
-    least, most = _without_strays(np.sort(distinct))
     # Things near the plane of the display may be smaller than a cell: zero is always within the range.
-    return min(least, 0) * UNIT - MARGIN, max(most, 0) * UNIT + MARGIN
-
-
-def _without_strays(values: NDArray[np.int64]) -> tuple[int, int]:
-    """Return least and greatest of sorted values, without a few at either end if these alone make the range wide."""
-    few = int(STRAY * len(values))
-    least, most = int(values[few]), int(values[len(values) - 1 - few])
-    if most - least < STRAYING * (values[-1] - values[0]):
-        return least, most
-    return int(values[0]), int(values[-1])
+    return min(int(distinct.min()), 0) * UNIT - MARGIN, max(int(distinct.max()), 0) * UNIT + MARGIN
 
 
 def _best_lattice(
