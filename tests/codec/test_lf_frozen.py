@@ -1,4 +1,4 @@
-"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 10: the same bytes decode to the same pixels on every machine.
+"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 11: the same bytes decode to the same pixels on every machine.
 
 In ``tests/golden/lf.zip``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
@@ -7,8 +7,8 @@ views of *Apples* at quantiser 26; the first encoder that left out transforms wr
 ``tuned.ii`` and ``rotated.ii``, of version 7, hold 7×6 views of 58×38 pixels and 7×2 of them of the benchmark's 9×9
 views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. ``dependent.ii``, of
 version 8, ``directed.ii``, of version 9, and ``parted.ii``, of version 10, hold 5×4 of those views of 46×35 pixels at
-quantiser 32. The decoder has
-integer arithmetic alone, so that a hash of the pixels is the expectation.
+quantiser 32. ``rigged.ii``, of version 11, holds `moved_planes` of `test_lf_tuning`, 3×4 views of 72×64 pixels at
+quantiser 36. The decoder has integer arithmetic alone, so that a hash of the pixels is the expectation.
 """
 
 import contextlib
@@ -40,6 +40,7 @@ PIXELS = {
     "dependent": "acb8e241356f7e43f530b611839fbefbbac435bae303635eafc0b8c355efe3cf",
     "directed": "f3d2f5aaf76a3db69ab2b2cb58612ba11f7fbc5b101a8a96d99cedcffffb3b84",
     "parted": "4fed4243261259d830d4fb3764e1c4d2ab4062f7e87ff84fe47535170d7c80a9",
+    "rigged": "b9bd647343a6ee5bd856526e9af14e8691de67989ee53125ff71c11f53b8391f",
     "row": "8779e10e45bc0ef8e8a3921c5f3ed192d0b0dad3092e0d9619ae1a54c87281c0",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
@@ -54,6 +55,7 @@ VERSIONS = {
     "dependent": stream.DEPENDENT,
     "directed": stream.DIRECTED,
     "parted": stream.PARTED,
+    "rigged": stream.RIGGED,
 }
 
 
@@ -88,7 +90,7 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
 
 def test_versions_are_the_numbers_in_the_streams():
     numbers = stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED
-    assert (*numbers, *stream.FLAGGED) == (2, 3, 5, 6, 7, 8, 9, 10)
+    assert (*numbers, *stream.FLAGGED) == (2, 3, 5, 6, 7, 8, 9, 10, 11)
 
 
 def test_the_third_stream_has_blocks_without_a_transform(monkeypatch):

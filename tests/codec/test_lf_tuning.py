@@ -14,6 +14,8 @@ from codec.coders.lf import (
     loop_filter_search,
     planes,
     ranges,
+    rig,
+    rig_search,
     stream,
     tuning,
 )
@@ -114,6 +116,7 @@ def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, 
         dependent=version > stream.TUNED,
         directed=version > stream.DEPENDENT,
         parted=version > stream.DIRECTED,
+        rig=rng.bytes(int(rng.integers(1, 300))) if version == stream.RIGGED else b"",
         steps=tuple(rng.integers(1, (1 << 18) + 1, log_stride + 2).tolist()),
     )
     levels = [rng.bytes(int(rng.integers(0, 300))) for _ in header.steps]
@@ -124,7 +127,9 @@ def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, 
         np.testing.assert_array_equal(getattr(found, name), getattr(header, name))
 
 
-@pytest.mark.parametrize(("at", "value"), [(1, 32 | 128), (1, 32 | 1), (2, 7), (2, 3 | 9 << 3), (7, 0), (8, 0)])
+@pytest.mark.parametrize(
+    ("at", "value"), [(1, 32 | 128), (1, 128 | 1), (1, 32 | 1), (2, 7), (2, 3 | 9 << 3), (7, 0), (8, 0)]
+)
 def test_headers_that_no_encoder_writes_are_refused(at, value):
     picture = shifted_plane((1, 1), grid=(2, 2))
     payload = bytearray(encode(picture, "si-lf:fast", qp=40).payload)
@@ -171,6 +176,83 @@ def test_views_of_a_turned_grid_are_predicted(monkeypatch):
     np.testing.assert_array_equal(decode(turned).pixels, shown)
     monkeypatch.setattr(ranges, "FAR", 1 << 20)
     assert turned.nbytes < 0.7 * encode(picture, "si-lf", qp=26).nbytes
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(1, 30), st.sampled_from([0, 1, 40, rig.MOST]), st.integers(0, 2**32 - 1))
+def test_entries_of_a_rig_are_read_as_they_were_written(views, most, seed):
+    rng = np.random.default_rng(seed)
+    entries, middle = rng.integers(-most, most + 1, (views, rig.FIELDS)), int(rng.integers(views))
+    entries[middle] = 0
+    np.testing.assert_array_equal(rig.unpack(rig.pack(entries, middle), views, middle), entries)
+
+
+def test_a_damaged_rig_is_refused():
+    with pytest.raises(ValueError, match="places of its views"):
+        rig.unpack(b"", 600, 0)
+    with pytest.raises(ValueError, match="places of its views"):
+        rig.unpack(rig.pack(np.full((3, rig.FIELDS), 2 * rig.MOST), 1), 3, 1)
+
+
+def test_references_depart_as_defined():
+    """Places in 2^-8 of a view; shifts in 2^-5 samples, which grow by as much over half the longer side."""
+    entries = np.zeros((3, rig.FIELDS), np.int64)
+    entries[0], entries[2] = (3, -2, 16, 0, 32, 0, 0, -64), (0, 1, 0, -8, 0, 0, 0, 0)
+    found = rig.departing(np.array([[0, -1024, 0], [1, 0, 1024]]), 2, [0, 1], rig.rig(entries, 64, 128))
+    np.testing.assert_array_equal(found[:, :3], [[0, -1024 + 12, -12], [1, 0, 1024 - 4]])
+    shifts = found[:, 3:].reshape(2, 2, 4, 2)  # of references, and of squares down and across
+    middles = np.array([-48, -16, 16, 48]) / 64
+    np.testing.assert_array_equal(shifts[0, :, :, 0], 128 + 256 * np.tile(middles, (2, 1)))
+    np.testing.assert_array_equal(shifts[0, :, :, 1], 64 - 512 * np.tile([[-16 / 64], [16 / 64]], 4))
+    np.testing.assert_array_equal(shifts[1], np.broadcast_to([0, 64], (2, 4, 2)))
+
+
+def moved_planes(entries, grid=(5, 5), height=96, width=104, seed=4):
+    """Two planes beside each other, of disparities 2 and -1.5, by cameras that depart from their places."""
+    rng = np.random.default_rng(seed)
+    waves, phases, colours = rng.normal(0, 0.3, (40, 2)), rng.uniform(0, 6, 40), rng.normal(0, 12, (40, 3))
+    field, side = np.empty((height, grid[0], width, grid[1], 3)), max(height, width)
+    y, x = np.mgrid[:height, :width]
+    for at, (v, u) in enumerate(np.ndindex(grid)):
+        place_x, place_y, *moved = entries[at] / [256, 256, *6 * [32]]
+        by_x, by_y = (2 * x - width) / side, (2 * y - height) / side
+        # The pixel of the middle view that lies here, approximately: departures are small.
+        back_x = x - moved[0] - moved[2] * by_x - moved[3] * by_y
+        back_y = y - moved[1] - moved[4] * by_x - moved[5] * by_y
+        disparity = np.where(y < height // 2, 2.0, -1.5)
+        back_x, back_y = back_x - disparity * (u - 2 + place_x), back_y - disparity * (v - 2 + place_y)
+        angles = waves[:, 0] * back_x[..., None] + waves[:, 1] * back_y[..., None] + phases
+        field[:, v, :, u] = 128 + np.sin(angles) @ colours
+    pixels = np.clip(np.rint(field), 0, 255).astype(np.uint8).reshape(height * grid[0], width * grid[1], 3)
+    return IIPicture(pixels, (width, height), grid[::-1])
+
+
+@pytest.mark.slow
+def test_views_beside_their_places_are_predicted(monkeypatch):
+    """Their entries are found, and save a third of the bytes; decoding repeats the encoder."""
+    entries = np.random.default_rng(7).normal(0, [12, 12, 16, 16, 8, 8, 8, 8], (25, 8))
+    entries[12] = 0
+    picture = moved_planes(entries)
+    source = lf.Source(picture, checked_options(lf.LightField(), {}))
+    payload, field = source.coded(32 * lf.FRACTIONS)
+    assert payload[0] == stream.RIGGED
+    found = rig.unpack(source.header.rig, 25, 12)
+    shown = np.empty_like(picture.pixels)
+    field.show(shown)
+    coded = encode(picture, "si-lf", qp=32)
+    assert coded.payload == payload
+    np.testing.assert_array_equal(decode(coded).pixels, shown)
+    np.testing.assert_array_less(np.abs(found - entries).mean(axis=0), 5)
+    monkeypatch.setattr(rig_search, "departures", lambda *_: None)
+    plain = encode(picture, "si-lf", qp=32)
+    assert plain.payload[0] == stream.PARTED
+    assert coded.nbytes < 0.67 * plain.nbytes
+
+
+@pytest.mark.parametrize("places", [(5, 5), (1, 9)], ids=str)
+def test_views_in_their_places_have_no_rig(places):
+    picture = moved_planes(np.zeros((places[0] * places[1], 8)), places)
+    assert not lf.Source(picture, checked_options(lf.LightField(), {})).header.rig
 
 
 def filtered_by_definition(view, modes, taps):

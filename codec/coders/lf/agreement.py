@@ -13,7 +13,7 @@ import numpy as np
 from ii_core.base.jit import part_kernel, stage_kernel
 
 from .blocks import DIFFERENT, UNKNOWN
-from .warp import LATTICE, clamped, lead
+from .warp import LATTICE, clamped, led
 
 MATCHED = 4  # sources that take part in matching
 TRUNCATED = 40 * 8  # eighths of a code: a larger difference tells no more
@@ -72,7 +72,8 @@ def _difference(views, sources, y, x, d, values):
     height, width = views.shape[2:]
     count, seen = min(sources.shape[0], MATCHED), 0
     for r in range(count):
-        at_x, at_y = 256 * x + lead(d, sources[r, 1]), 256 * y + lead(d, sources[r, 2])
+        dy, dx = led(sources, r, d, y, x, (height, width))
+        at_x, at_y = 256 * x + dx, 256 * y + dy
         if _sees(at_x, at_y, width, height):
             plane = views[np.uint64(sources[r, 0]), 0]
             values[np.uint64(seen)] = between(plane, at_y >> 8, at_x >> 8, (at_y >> 4) & 15, (at_x >> 4) & 15) >> 8
@@ -121,7 +122,8 @@ def _fill_span(views, sources, span, scratch, y, x0, d, into):
     some = np.int64(0)  # bits of samples that not every source sees
     for r in range(MATCHED):
         plane = views[np.uint64(sources[r, 0]), 0]
-        unseen[r] = _take_span(plane, y, x0, lead(d, sources[r, 2]), lead(d, sources[r, 1]), span[r])
+        dy, dx = led(sources, r, d, y, x0, plane.shape)
+        unseen[r] = _take_span(plane, y, x0, dy, dx, span[r])
         some |= unseen[r]
     first, second, third, fourth = span[0], span[1], span[2], span[3]
     for j in range(SPAN):
@@ -199,7 +201,8 @@ def agrees(s, r, y, x, d):
     """Whether a source's own disparity says that it sees the same."""
     height, width = s.counts.shape
     across, down = s.sources[r, 1], s.sources[r, 2]
-    i, j = x + ((lead(d, across) + 128) >> 8), y + ((lead(d, down) + 128) >> 8)
+    dy, dx = led(s.sources, r, d, y, x, (height, width))
+    i, j = x + ((dx + 128) >> 8), y + ((dy + 128) >> 8)
     if i < 0 or j < 0 or i >= width or j >= height:
         return False
     other = np.int64(s.disparities[np.uint64(s.sources[r, 0]), np.uint64(j), np.uint64(i)])

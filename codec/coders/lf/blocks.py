@@ -25,7 +25,7 @@ from .cross import code_cross, keep_first, rebuild
 from .intra import MODES, SMOOTH, fill_border, predict_intra
 from .samples import LARGEST_SKIPPED, code_samples
 from .transform import LARGEST, SINE_ACROSS, SINE_DOWN, sides, size_of
-from .warp import LATTICE, lead, moved_block
+from .warp import LATTICE, led, moved_block
 
 LOG_LARGEST, LOG_LEAST = 5, 2
 MOST_HALVINGS = 2  # of a square
@@ -279,7 +279,8 @@ def seen_mask(job, by, bx, shape, index):
         for place in range(5):
             y = 4 * by + (2 * down if place == 4 else down + 2 * down * (place >> 1))
             x = 4 * bx + (2 * right if place == 4 else right + 2 * right * (place & 1))
-            i, j = x + ((lead(d, columns) + 128) >> 8), y + ((lead(d, rows) + 128) >> 8)
+            dy, dx = led(job.references, r, d, y, x, (height, width))
+            i, j = x + ((dx + 128) >> 8), y + ((dy + 128) >> 8)
             if i < 0 or j < 0 or i >= width or j >= height:
                 against += 1
             else:
@@ -571,20 +572,9 @@ def predict_explicit(job, work, y0, x0, shape, index, mask):
     for r in range(job.references.shape[0]):
         if (mask >> r) & 1:
             count += 1
+            dy, dx = led(job.references, r, d, y0, x0, job.views.shape[2:])
             for p in range(3):
-                moved_block(
-                    job.views,
-                    job.references[r, 0],
-                    p,
-                    y0,
-                    x0,
-                    h,
-                    w,
-                    lead(d, job.references[r, 2]),
-                    lead(d, job.references[r, 1]),
-                    work.rows,
-                    predicted,
-                )
+                moved_block(job.views, job.references[r, 0], p, y0, x0, h, w, dy, dx, work.rows, predicted)
     if count == 3:
         for p in range(3):
             for y in range(h):

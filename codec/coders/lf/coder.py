@@ -17,14 +17,25 @@ from ii_core import IIPicture
 from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
-from . import arithmetic, denoise, loop_filter_search, planes, ranges, search, stream, synthesis, tuning
+from . import (
+    arithmetic,
+    denoise,
+    loop_filter_search,
+    planes,
+    ranges,
+    rig,
+    rig_search,
+    search,
+    stream,
+    synthesis,
+    tuning,
+)
 from .blocks import MOST_REFERENCES, Job, Work, code_blend, code_view, new_work, zeros
 from .contexts import Contexts
 from .field import Field
 from .pyramid import Node, Place, pyramid
 from .search import Search
 from .stream import Header
-from .workers import Workers
 
 FINEST, COARSEST = 0, 63
 FRACTIONS = 16  # of a quantiser, between which a rate is searched
@@ -176,7 +187,7 @@ def decoded_batches(
     """Decode one batch of views after another; yield the level, the views, and the bytes read so far."""
     contexts, work = contexts or Contexts(), new_work()
     before = stream.head_bytes(field.header, levels)
-    with Workers(threads) as workers:
+    with clock.Workers(threads) as workers:
         for level, data in enumerate(levels):
             coder = arithmetic.reader(contexts.of(level), data)
             for nodes in field.batches(level):
@@ -252,6 +263,12 @@ class Source:
         else:
             self.axes = colours = planes.detail_axes(self.pixels, self.grid)
         low, high, lattice = ranges.estimated(self.view, self.grid, skewed=not exact)
+        self.rig, entries = None, None
+        if not exact:
+            entries = rig_search.departures(self.view, self.grid, lattice, (low, high))
+        if entries is not None:
+            self.rig = rig.rig(entries, *self.view(0, 0).shape[1:])
+            low, high = ranges.moved_range(self.view, self.grid, lattice, self.rig)
         self._target_of: Any = None
         self._latest_target = np.zeros((3, 0, 0), np.int16)
         self.header = Header(
@@ -270,6 +287,7 @@ class Source:
             dependent=not exact,
             directed=not exact,
             parted=not exact,
+            rig=b"" if entries is None else rig.pack(entries, self.grid[0] // 2 * self.grid[1] + self.grid[1] // 2),
             steps=(),
         )
 
@@ -362,7 +380,7 @@ class Source:
     def levels(self, field: Field, contexts: Contexts, *, forgetful: bool = False) -> list[bytes]:
         """Return the bytes of each level; the field then holds what the decoder will make of them."""
         work, levels = new_work(), []
-        with Workers(self.threads) as workers:
+        with clock.Workers(self.threads) as workers:
             for number in range(len(field.levels)):
                 room = (EXACT_BYTES if field.header.exact else VIEW_BYTES) * field.shape[0] * field.shape[1] + 1024
                 coder = arithmetic.writer(contexts.of(number), room)
@@ -445,7 +463,7 @@ class Source:
             return self.view(*place)
         key, limits = (place, header.steps, header.scales), (header.low, header.high)
         if self._target_of != key:  # the first view is coded twice
-            found = denoise.denoised(self.view, self.grid, place, header.lattice, limits, header.steps[-1])
+            found = denoise.denoised(self.view, self.grid, place, header.lattice, limits, header.steps[-1], self.rig)
             self._target_of, self._latest_target = key, found
         return self._latest_target
 

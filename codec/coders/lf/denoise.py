@@ -7,7 +7,6 @@ filtering, ICIP 2020). Noise of a view predicts no other view, and costs most bi
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,10 @@ from numpy.typing import NDArray
 from ii_core.base.jit import array_kernel
 
 from .pyramid import Place
-from .ranges import UNIT, Lattice, cell_errors, offsets
+from .ranges import UNIT, Lattice, cell_errors, offsets, over_squares
+from .rig import Rig
 from .transform import LARGEST
-from .warp import lead, moved_block
+from .warp import led, moved_block
 
 # The best whole unit of disparity is found by bilinear interpolation. These beside it are then compared in so many
 # views, with the filters of prediction.
@@ -36,6 +36,7 @@ def denoised(
     lattice: Lattice,
     limits: tuple[int, int],
     step: int,
+    rig: Rig | None = None,
 ) -> NDArray[np.int16]:
     """Planes (3, H, W) of a view with less noise.
 
@@ -51,6 +52,8 @@ def denoised(
         Least and greatest disparity, in 2^-8 samples.
     step : int
         Of the quantiser of most views, in 2^-7 of an 8-bit code.
+    rig : Rig, optional
+        Departures of views from the lattice.
     """
     (row, col), original = place, view(*place)
     near = [
@@ -62,16 +65,17 @@ def denoised(
     if not near:
         return original
     near.sort(key=lambda other: (abs(other[0] - row) + abs(other[1] - col), other))
-    views, references = np.stack([view(*other) for other in near]), offsets(place, near, lattice)
+    views, references = np.stack([view(*other) for other in near]), offsets(place, near, lattice, grid, rig)
     first, last = limits[0] // UNIT, -(-limits[1] // UNIT)
-    disparity = UNIT * (first + _over_squares(cell_errors(view, grid, place, lattice, (first, last))).argmin(axis=0))
+    errors = over_squares(cell_errors(view, grid, place, lattice, (first, last), rig))
+    disparity = UNIT * (first + errors.argmin(axis=0))
     moved = np.empty((len(near), *original.shape), np.int16)
     misfits = np.empty((len(near), *disparity.shape))
     fits = []
     for part in PARTS:
         _move(views, references[:NEAREST], disparity + part, original[:1], moved, misfits)
         fits.append(misfits[:NEAREST].sum(axis=0))
-    disparity += np.array(PARTS)[_over_squares(np.stack(fits)).argmin(axis=0)]
+    disparity += np.array(PARTS)[over_squares(np.stack(fits)).argmin(axis=0)]
     _move(views, references, disparity, original, moved, misfits)
     noise = np.minimum(_noise(original[0], np.median(misfits, axis=0)), (MOST * step / 16) ** 2)
     apart = np.array([np.hypot(r - row, c - col) for r, c in near])
@@ -79,15 +83,6 @@ def denoised(
     weights = weights.repeat(4, axis=1).repeat(4, axis=2)
     total = original + np.einsum("ryx,rpyx->pyx", weights, moved)
     return np.rint(total / (1 + weights.sum(axis=0))).astype(np.int16)
-
-
-def _over_squares(errors: NDArray[Any]) -> NDArray[Any]:
-    """Return errors (disparities, rows, columns) of cells, summed over 3×3 cells."""
-    for axis in (1, 2):
-        sides = [(0, 0), (int(axis == 1),) * 2, (int(axis == 2),) * 2]
-        padded, count = np.pad(errors, sides, mode="edge"), errors.shape[axis]
-        errors = padded.take(range(count), axis) + errors + padded.take(range(2, count + 2), axis)
-    return errors
 
 
 def _noise(luma: NDArray[np.int16], misfits: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -113,7 +108,7 @@ def _move(views, references, disparity, original, moved, misfits):
         for by in range(disparity.shape[0]):
             for bx in range(disparity.shape[1]):
                 d, total, y0, x0 = disparity[by, bx], np.int64(0), 4 * by, 4 * bx
-                dy, dx = lead(d, references[r, 2]), lead(d, references[r, 1])
+                dy, dx = led(references, r, d, y0, x0, views.shape[2:])
                 for p in range(planes):
                     for y in range(4):
                         for x in range(4):

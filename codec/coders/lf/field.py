@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import loop_filter, motion, synthesis
+from . import loop_filter, motion, rig, synthesis
 from .arithmetic import Arithmetic
 from .blocks import (
     DONE,
@@ -28,7 +28,7 @@ from .planes import gather, scatter
 from .pyramid import Node, Place, batches, pyramid
 from .stream import UPRIGHT, Header
 from .synthesis import Synthesis, chosen, new_synthesis
-from .warp import LATTICE
+from .warp import LATTICE, UNSHIFTED
 
 EIGHTH = 32  # of a sample, in units of disparity
 MOST_SEARCHED = 800  # disparities of one view
@@ -65,6 +65,10 @@ class Field:
         self._exact = new_exact(height, width, dtype)
         self.filters = loop_filter.new_filters(len(self.views) if header.filtered else 0)
         self.decoded = np.zeros(grid, bool)
+        self.rig = None
+        if header.rig:
+            middle = self.number((self.levels[0][0].row, self.levels[0][0].col))
+            self.rig = rig.rig(rig.unpack(header.rig, len(self.views), middle), *self.shape)
         self.past = tuple(past)
         self.motions = motion.NOTHING
         if past:
@@ -198,14 +202,15 @@ class Field:
             (self.number((v, u)), UPRIGHT * (u - col) + across * (v - row), down * (u - col) + apart * (v - row))
             for v, u in places
         ]
-        return np.array(rows, np.int64).reshape(-1, 3)
+        found = np.array(rows, np.int64).reshape(-1, 3)
+        return found if self.rig is None else rig.departing(found, self.number((row, col)), found[:, 0], self.rig)
 
     def _unit(self, references: np.ndarray) -> int:
         """An eighth of a sample in the farthest view, or more where the range is wide."""
         if not len(references):
             return EIGHTH
         spread = self.header.high - self.header.low
-        farthest = (int(np.abs(references[:, 1:]).max()) + UPRIGHT // 2) >> LATTICE
+        farthest = (int(np.abs(references[:, 1:UNSHIFTED]).max()) + UPRIGHT // 2) >> LATTICE
         return max(EIGHTH // max(farthest, 1), -(-spread // MOST_SEARCHED), 1)
 
 

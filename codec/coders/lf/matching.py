@@ -14,7 +14,7 @@ from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel
 
 from .blocks import EXPLICIT, MOST_REFERENCES, UNKNOWN, from_where, guesses, kind_cost, mask_cost, seen_mask
 from .transform import LARGEST, sides
-from .warp import clamped, lead, moved_block
+from .warp import clamped, led, moved_block
 
 PAIRS = MOST_REFERENCES * (MOST_REFERENCES + 1) // 2  # the lower triangle by rows
 DIAGONAL = 0, 2, 5, 9
@@ -173,7 +173,7 @@ def fill_products(job, original, y0, x0, match):
         for by in range(rows):
             at = 0
             for r in range(count):
-                dx, dy = lead(d, job.references[r, 1]), lead(d, job.references[r, 2])
+                dy, dx = led(job.references, r, d, y0, x0, (height, width))
                 own, plane = match.missed[r], job.views[job.references[r, 0], 0]
                 _missed_rows(plane, original[0], y0 + 4 * by, x0, dy, dx, match.between, own)
                 for s in range(r + 1):
@@ -282,7 +282,7 @@ def _compare(job, match, work, original, y0, x0, h, w, index, planes):
             for y in range(h):
                 for x in range(w):
                     into[y, x] = 0
-            dy, dx = lead(d, job.references[r, 2]), lead(d, job.references[r, 1])
+            dy, dx = led(job.references, r, d, y0, x0, job.views.shape[2:])
             moved_block(job.views, job.references[r, 0], p, y0, x0, h, w, dy, dx, work.rows, work.predicted)
             missed = match.moved[r]
             for y in range(h):

@@ -14,7 +14,7 @@ from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel, tuned_kerne
 from . import contexts as at
 from .arithmetic import bit_cost, code_bit, code_number, number_cost
 from .transform import sides, size_of
-from .warp import clamped, lead, moved_block
+from .warp import clamped, led, moved_block
 
 MOST_PAST = 4  # earlier instants
 QUARTER = 64  # of a sample, in 2^-8
@@ -25,6 +25,9 @@ NONE = -1
 # What is known of each 4×4: whether it is predicted in time, and its vector.
 IN_TIME, PAST, DOWN, ACROSS, FIELDS = range(5)
 NOTHING = np.zeros((0, 1, 1, 1), np.int16)  # earlier instants of a picture alone
+# Steps of the encoder's search.
+WIDE, NEAR = 32, 8  # quarters of a sample: first step of the largest blocks, and of others
+ROUNDS = 4  # of a step
 
 
 @stage_kernel
@@ -76,8 +79,8 @@ def inherited(job, by, bx, shape):
     y, x = 4 * by + (h >> 1), 4 * bx + (w >> 1)
     if job.synthesised:
         d = np.int64(job.disparity[y, x])
-        x += (lead(d, job.references[0, 1]) + 128) >> 8
-        y += (lead(d, job.references[0, 2]) + 128) >> 8
+        dy, dx = led(job.references, 0, d, y, x, job.views.shape[2:])
+        y, x = y + ((dy + 128) >> 8), x + ((dx + 128) >> 8)
     j, i = clamped(y >> 2, height), clamped(x >> 2, width)
     view = job.references[0, 0]
     return noted(job, view, j, i), 1 + np.int64(job.motions[view, IN_TIME, j, i])
@@ -214,3 +217,67 @@ def carry(job, past, out):
                 instant, down, across = unpacked(noted(job, job.at, y >> 2, x >> 2))
                 j, i = clamped(y + ((down + 2) >> 2), height), clamped(x + ((across + 2) >> 2), width)
                 out[y, x] = past[instant, j, i]
+
+
+@part_kernel
+def _vector_error(costs, job, search, work, y0, x0, shape, vector):
+    """Squared error of the first plane + weight · bits of the vector."""
+    h, w = sides(shape)
+    move(job, work, 1, y0, x0, shape, vector)
+    total = np.float32(0)
+    for y in range(h):
+        for x in range(w):
+            difference = np.float32(search.original[0, y0 + y, x0 + x] - work.predicted[0, y, x])
+            total += difference * difference
+    return total + search.weight * vector_cost(costs, job, y0 >> 2, x0 >> 2, shape, vector)
+
+
+@part_kernel
+def _descend(costs, job, search, work, y0, x0, shape, vector, best, step):
+    """Move to the best of eight neighbours, by steps that halve; return vector and cost."""
+    while step:
+        for _ in range(ROUNDS):
+            past, down, across = unpacked(vector)
+            before = vector
+            for place in range(9):
+                y, x = down + (place // 3 - 1) * step, across + (place % 3 - 1) * step
+                if place == 4 or max(abs(y), abs(x)) > MOST:
+                    continue
+                tried = packed(past, y, x)
+                cost = _vector_error(costs, job, search, work, y0, x0, shape, tried)
+                if cost < best:
+                    best, vector = cost, tried
+            if vector == before:
+                break
+        step >>= 1
+    return vector, best
+
+
+@part_kernel
+def best_vector(costs, job, search, work, y0, x0, shape, enough):
+    """The vector of the least cost, from the guesses outwards by steps that halve.
+
+    A guess that costs less than ``enough`` is not refined.
+    """
+    first, left, above = guesses(job, y0 >> 2, x0 >> 2, shape)
+    vector = first
+    best = _vector_error(costs, job, search, work, y0, x0, shape, first)
+    for guess in (left, above, np.int64(STILL)):
+        if guess != NONE and guess != first:
+            cost = _vector_error(costs, job, search, work, y0, x0, shape, guess)
+            if cost < best:
+                best, vector = cost, guess
+    if best < enough:
+        return vector
+    step = WIDE if shape == (5, 5) else NEAR
+    vector, best = _descend(costs, job, search, work, y0, x0, shape, vector, best, step)
+    past, down, across = unpacked(vector)
+    for other in range(job.past.shape[0]):
+        if other != past:
+            y, x = down * (other + 1) // (past + 1), across * (other + 1) // (past + 1)
+            tried = packed(other, min(max(y, -MOST), MOST), min(max(x, -MOST), MOST))
+            cost = _vector_error(costs, job, search, work, y0, x0, shape, tried)
+            tried, cost = _descend(costs, job, search, work, y0, x0, shape, tried, cost, 4)
+            if cost < best:
+                best, vector = cost, tried
+    return vector

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .blocks import Job
 from .matching import DIAGONAL, fill_products, new_match
+from .rig import Rig, departing
 from .stream import UPRIGHT
 from .transform import LARGEST
 
@@ -54,15 +56,26 @@ def estimated(view: Views, grid: tuple[int, int], *, skewed: bool = True) -> tup
     return low, high, lattice
 
 
+def moved_range(view: Views, grid: tuple[int, int], lattice: Lattice, rig: Rig) -> tuple[int, int]:
+    """Return least and greatest disparity of views beside their places."""
+    middle = grid[0] // 2, grid[1] // 2
+    return _range(view, grid, middle, cell_errors(view, grid, middle, lattice, rig=rig), lattice, rig)
+
+
 def _range(
-    view: Views, grid: tuple[int, int], middle: tuple[int, int], errors: NDArray[np.float32], lattice: Lattice
+    view: Views,
+    grid: tuple[int, int],
+    middle: tuple[int, int],
+    errors: NDArray[np.float32],
+    lattice: Lattice,
+    rig: Rig | None = None,
 ) -> tuple[int, int]:
     """Return least and greatest disparity from those of the middle view and of four others."""
     # Views near the corners see what the one in the middle does not.
     rows, cols = ({count // 6, count - 1 - count // 6} for count in grid)
     others = sorted({(row, col) for row in rows for col in cols} - {middle})
     best = [_distinct(errors, LARGE), _distinct(errors, SMALL)]
-    best += [_distinct(cell_errors(view, grid, place, lattice), SMALL) for place in others]
+    best += [_distinct(cell_errors(view, grid, place, lattice, rig=rig), SMALL) for place in others]
     distinct = np.concatenate(best) - len(errors) // 2
     if not len(distinct):
         return -UNIT, UNIT
@@ -105,6 +118,7 @@ def cell_errors(
     place: tuple[int, int],
     lattice: Lattice,
     limits: tuple[int, int] | None = None,
+    rig: Rig | None = None,
 ) -> NDArray[np.float32]:
     """Squared error (disparities, H / 4, W / 4) of a view against its neighbours.
 
@@ -115,7 +129,7 @@ def cell_errors(
     near = [(r, c) for r, c in near if 0 <= r < grid[0] and 0 <= c < grid[1]]
     if not near:
         return np.zeros((1, 1, 1), np.float32)
-    references = offsets(place, near, lattice)
+    references = offsets(place, near, lattice, grid, rig)
     original, views = view(row, col), np.stack([view(r, c) for r, c in near])
     reach = min(REACH, max(original.shape[1:]) // 2) * 256 // UNIT
     low, high = limits or (-reach, reach)
@@ -150,16 +164,30 @@ def cell_errors(
     return errors
 
 
-def offsets(place: tuple[int, int], others: Sequence[tuple[int, int]], lattice: Lattice) -> NDArray[np.int64]:
+def offsets(
+    place: tuple[int, int],
+    others: Sequence[tuple[int, int]],
+    lattice: Lattice,
+    grid: tuple[int, int],
+    rig: Rig | None = None,
+) -> NDArray[np.int64]:
     """Return number, columns and rows (J, 3) of how far other views are on the lattice, as `blocks.Job` has them."""
     (row, col), (across, down, apart) = place, lattice
-    return np.array(
-        [
-            (i, UPRIGHT * (c - col) + across * (r - row), down * (c - col) + apart * (r - row))
-            for i, (r, c) in enumerate(others)
-        ],
-        np.int64,
-    )
+    rows = [
+        (i, UPRIGHT * (c - col) + across * (r - row), down * (c - col) + apart * (r - row))
+        for i, (r, c) in enumerate(others)
+    ]
+    found = np.array(rows, np.int64).reshape(-1, 3)
+    return found if rig is None else departing(found, row * grid[1] + col, [r * grid[1] + c for r, c in others], rig)
+
+
+def over_squares(errors: NDArray[Any]) -> NDArray[Any]:
+    """Return errors (disparities, rows, columns) of cells, summed over 3×3 cells."""
+    for axis in (1, 2):
+        sides = [(0, 0), (int(axis == 1),) * 2, (int(axis == 2),) * 2]
+        padded, count = np.pad(errors, sides, mode="edge"), errors.shape[axis]
+        errors = padded.take(range(count), axis) + errors + padded.take(range(2, count + 2), axis)
+    return errors
 
 
 def _cells(errors: NDArray[np.float32], size: int) -> NDArray[np.float32]:

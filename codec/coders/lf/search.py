@@ -41,8 +41,7 @@ from .field import EIGHTH
 from .intra import MODES
 from .intra_search import least_error, rank_directions
 from .matching import HUGE, best_explicit, fill_products, new_match
-from .motion import predict_in_time
-from .motion_search import best_vector
+from .motion import best_vector, predict_in_time
 from .residual_search import BEST, copy_trial, estimated_cost, keep, new_trial, try_residual, try_transform
 from .transform import sides
 

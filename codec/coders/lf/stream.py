@@ -13,10 +13,12 @@ from ...bitstream.compact import leb128, read_leb128
 from .planes import bt709_colours
 
 # Versions 2, 3, 5 and 6 say by their number which tools they have: factors between planes, and residuals without a
-# transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent
-# quantiser as well, version 9 other intra modes, too, version 10 halved blocks; lossless coding still writes 2 and 3.
-VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED, TUNED, DEPENDENT, DIRECTED, PARTED = 3, 2, 5, 6, 7, 8, 9, 10
-FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED
+# transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent quantiser as well,
+# version 9 other intra modes, too, version 10 halved blocks, version 11 views beside their places. It is written for
+# these alone; lossless coding still writes 2 and 3.
+VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED = 3, 2, 5, 6
+TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED = 7, 8, 9, 10, 11
+FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED
 _VERSIONS = {
     (False, False): UNCROSSED,
     (True, False): VERSION,
@@ -25,8 +27,8 @@ _VERSIONS = {
 }
 _TOOLS = {version: tools for tools, version in _VERSIONS.items()}
 QUARTERS, EIGHTHS = 2, 3  # binary logarithms of the unit of factors between planes
-# Flags of versions 7 to 10; the lowest two bits are 0, or the logarithm of the factors' unit.
-_SKIPS, _FILTERS, _DOWN, _BT709, _SKEWED, _FLAGS = 4, 8, 16, 32, 64, 128
+# Flags of versions 7 to 11; the lowest two bits are 0, or the logarithm of the factors' unit.
+_SKIPS, _FILTERS, _DOWN, _BT709, _SKEWED, _RIGGED = 4, 8, 16, 32, 64, 128
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
 )
@@ -71,15 +73,17 @@ class Header:
     skipping : bool
         Whether small blocks may have a residual without a transform.
     tuned : bool
-        Versions 7 to 10: large coefficients have contexts by their neighbourhood, and views may be filtered.
+        Versions 7 to 11: large coefficients have contexts by their neighbourhood, and views may be filtered.
     filtered : bool
         Whether views may be filtered in the loop.
     dependent : bool
-        Versions 8 to 10: the quantiser of coefficients is a dependent one.
+        Versions 8 to 11: the quantiser of coefficients is a dependent one.
     directed : bool
-        Versions 9 and 10: intra blocks smooth borders, have contexts of directions, and transforms of sines.
+        Versions 9 to 11: intra blocks smooth borders, have contexts of directions, and transforms of sines.
     parted : bool
-        Version 10: squares of blocks may be halved.
+        Versions 10 and 11: squares of blocks may be halved.
+    rig : bytes
+        Version 11: departures of views from their places on the lattice, as `rig` packs them; empty without any.
     steps : tuple of int
         The quantiser's step of each level, in 2^-7 of an 8-bit code.
     """
@@ -99,6 +103,7 @@ class Header:
     dependent: bool = False
     directed: bool = False
     parted: bool = False
+    rig: bytes = b""
     steps: tuple[int, ...]
 
 
@@ -117,8 +122,9 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
         return _HEAD.pack(version, *common, *colours) + b"".join(_LEVEL.pack(*level) for level in index)
     flags = header.crossed | _SKIPS * header.skipping | _FILTERS * header.filtered
     flags |= _DOWN * (header.lattice[2] < 0) | _BT709 * (header.scales is not None) | _SKEWED * _skewed(header)
+    flags |= _RIGGED * bool(header.rig)
     head = _TUNED.pack(
-        FLAGGED[header.dependent + header.directed + header.parted],
+        FLAGGED[header.dependent + header.directed + header.parted + bool(header.rig)],
         flags,
         header.log_stride | header.sources << 3,
         header.low,
@@ -126,6 +132,7 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
     )
     head += bytes(header.scales) if header.scales else _ROTATION.pack(*colours)
     head += _LATTICE.pack(*header.lattice) if _skewed(header) else b""
+    head += leb128(len(header.rig)) + header.rig if header.rig else b""
     return head + b"".join(leb128(step) + leb128(length) for step, length in index)
 
 
@@ -213,6 +220,10 @@ def _read_tuned(payload: bytes) -> _Read:
     if flags & _SKEWED:
         lattice = _LATTICE.unpack_from(payload, at)
         at += _LATTICE.size
+    rig = b""
+    if flags & _RIGGED and version >= RIGGED:
+        length, at = read_leb128(payload, at)
+        rig, at = payload[at : at + length], at + length
     index = []
     for _ in range((counts & 7) + 2):
         step, at = read_leb128(payload, at)
@@ -227,12 +238,13 @@ def _read_tuned(payload: bytes) -> _Read:
         "high": high,
         "colours": colours,
         "scales": scales,
-        "crossed": flags & (3 | -_FLAGS),  # with flags that no encoder sets
+        "crossed": flags & (3 | (_RIGGED if version < RIGGED else 0)),  # with a flag that no encoder sets
         "skipping": bool(flags & _SKIPS),
         "tuned": True,
         "filtered": bool(flags & _FILTERS),
         "dependent": version >= DEPENDENT,
         "directed": version >= DIRECTED,
         "parted": version >= PARTED,
+        "rig": rig,
     }
     return values, index, at

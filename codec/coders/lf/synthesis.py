@@ -17,7 +17,8 @@ from ii_core.base.jit import array_kernel, lean_kernel, part_kernel, stage_kerne
 
 from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, disagreement, hashed
 from .blocks import EXPLICIT, INDEX, KIND, UNKNOWN, zeros
-from .warp import BEFORE, FILTERS, LATTICE, TAPS, clamped, filtered, lead
+from .transform import LARGEST
+from .warp import BEFORE, FILTERS, LATTICE, TAPS, UNSHIFTED, clamped, filtered, led
 
 CANDIDATES = 8
 MOST_SOURCES = 8
@@ -131,13 +132,14 @@ def project(s, apart):
         for x in range(width):
             s.counts[y, x] = 0
     for r in range(s.sources.shape[0]):
-        view, across, down = s.sources[r, 0], s.sources[r, 1], s.sources[r, 2]
+        view = s.sources[r, 0]
         for y in range(height):
             for x in range(width):
                 d = np.int64(s.disparities[view, y, x])
                 if d == UNKNOWN:
                     continue
-                to_x, to_y = x + ((128 - lead(d, across)) >> 8), y + ((128 - lead(d, down)) >> 8)
+                dy, dx = led(s.sources, r, d, y, x, (height, width))
+                to_x, to_y = x + ((128 - dx) >> 8), y + ((128 - dy) >> 8)
                 if 0 <= to_x < width and 0 <= to_y < height:
                     _insert(s, to_y, to_x, d, apart)
 
@@ -205,6 +207,8 @@ def blend(s, nearest, every):
     height, width = s.counts.shape
     count = s.sources.shape[0]
     _weigh_sources(s, nearest)
+    # A run is within a square, if squares have shifts.
+    squares = 1 if s.sources.shape[1] > UNSHIFTED else 0
     for y in range(height >> 2):
         for x in range(width >> 2):
             s.doubt[y, x] = 0
@@ -215,6 +219,8 @@ def blend(s, nearest, every):
             if x == end and not nearest:
                 end = x + 1
                 while end < width and end - x < RUN and s.disparity[y, end] == s.disparity[y, x]:
+                    if squares and end % LARGEST == 0:
+                        break
                     end += 1
                 start = x
                 _interpolate(s, y, x, end - x, np.int64(0) if d == UNKNOWN else d, count)
@@ -246,7 +252,8 @@ def _take(s, r, y, x, d, nearest, place):
     ``place`` is that of the sample in the run that `_interpolate` has made.
     """
     height, width = s.counts.shape
-    at_x, at_y = 256 * x + lead(d, s.sources[r, 1]), 256 * y + lead(d, s.sources[r, 2])
+    dy, dx = led(s.sources, r, d, y, x, (height, width))
+    at_x, at_y = 256 * x + dx, 256 * y + dy
     inside = -128 <= at_x <= 256 * width - 128 and -128 <= at_y <= 256 * height - 128
     weight = s.scratch[(6 if agrees(s, r, y, x, d) else 7) if inside else 8, r]
     if nearest:
@@ -309,7 +316,7 @@ def _six_taps_run(plane, iy, ix, py, px, count, sums, out):
 def _interpolate(s, y, x, length, d, count):
     """s.taken[:count, :, :length] = samples of the sources along a disparity."""
     for r in range(count):
-        dx, dy = lead(d, s.sources[r, 1]), lead(d, s.sources[r, 2])
+        dy, dx = led(s.sources, r, d, y, x, s.counts.shape)
         ix, iy, px, py = x + (dx >> 8), y + (dy >> 8), (dx >> 4) & 15, (dy >> 4) & 15
         for p in range(3):
             _six_taps_run(s.views[s.sources[r, 0], p], iy, ix, py, px, length, s.sums, s.taken[r, p])
@@ -376,7 +383,7 @@ def _mismatch(s, at, y, x, d):
     within = 0 < x < width - 1 and 0 < y < height - 1
     for r in range(count):
         total = np.int64(0)
-        dx, dy = lead(d, s.sources[r, 1]), lead(d, s.sources[r, 2])
+        dy, dx = led(s.sources, r, d, y, x, (height, width))
         ix, iy, px, py = dx >> 8, dy >> 8, (dx >> 4) & 15, (dy >> 4) & 15
         own, other = s.views[at, 0], s.views[s.sources[r, 0], 0]
         if x + ix < -1 or y + iy < -1 or x + ix > width or y + iy > height:

@@ -34,6 +34,7 @@ FILTERS = _filters()
 assert (FILTERS.sum(axis=1) == 64).all() and FILTERS[0].tolist() == [0, 0, 64, 0, 0, 0]
 
 
+UNSHIFTED = 3  # columns of references: number, and how far across and down
 LATTICE = 10  # binary logarithm of the unit of views' positions on the grid
 
 
@@ -47,6 +48,21 @@ def lead(d, along):
 def clamped(i, n):
     """The index of the sample, or of the border's."""
     return min(max(i, 0), n - 1)
+
+
+@stage_kernel
+def led(references, r, d, y, x, shape):
+    """How far a disparity leads down and across to a reference from a sample of the view, in 2^-8 samples.
+
+    References have columns of shifts by square if views are beside their places (`rig`).
+    """
+    down, across = lead(d, references[r, 2]), lead(d, references[r, 1])
+    if references.shape[1] > UNSHIFTED:
+        height, width = shape
+        row, column = clamped(y, height) // LARGEST, clamped(x, width) // LARGEST
+        at = UNSHIFTED + 2 * (row * ((width + LARGEST - 1) // LARGEST) + column)
+        across, down = across + references[r, np.uint64(at)], down + references[r, np.uint64(at + 1)]
+    return down, across
 
 
 @stage_kernel
