@@ -1,20 +1,21 @@
 """Coverage: which share of each pixel the bodies have, by visibility alone.
 
-Every pixel is a cell of `edges` between its corners. One body at all corners and the centre has the pixel; two bodies
-share it by the chord of their edge; any other pixel gets `SAMPLES`. Rays pass the middle of an aperture.
+Pixels around which one body is seen are that body's. Any others are parted as by `edges`: two bodies share a pixel by
+the lines that part them. Where small bodies may be, it gets `SAMPLES`. Rays pass the middle of an aperture.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .edges import Cells, Sight, _part, _places
+from .edges import FOLLOWED, Cells, Look, Sight
 from .kernels import cells as kernels
-from .kernels.cells import CUT, OPEN, UNITS, Places, Points
+from .kernels.cells import DONE, GROUPS, UNITS, Places, Points
 from .sampling import Edges, fixed_sum
 from .support_images import NAMES, name_hashes
 from .tracer import Support
@@ -29,7 +30,10 @@ Shares = tuple[Whole, Whole, NDArray[np.float64]]  # numbers of pixels, bodies, 
 
 @dataclass
 class Coverage(Cells):
-    """Cells of bodies: each has a light of its own, by which cells tell them apart and mix them."""
+    """Pixels of bodies: each has a light of its own."""
+
+    by_body = True
+    found: list[Shares] = field(init=False, default_factory=list)
 
     def _trace(self, places: Places, points: Points, bodies: bool, finer: float) -> None:
         self.sight.check()
@@ -49,35 +53,42 @@ class Coverage(Cells):
         assert seen.object_id is not None
         return seen.object_id
 
+    def _lights(self, look: Look, picks: NDArray[np.int32], centres: Whole) -> Iterator[tuple[Any, ...]]:
+        first = picks[:, :, 0].copy()
+        first[centres, 0] = 0
+        which, group = np.nonzero(first >= 0)
+        faces = look.seen.faces[which * look.places.shape[1] + first[which, group]]
+        bodies = np.where(faces >= 0, self.sight.tracer.scene.object_of_face[faces], -1).astype(np.int32)
+        look.bodies[which, group] = bodies
+        light = np.zeros((len(which), 3), np.float32)
+        light[:, 0] = (bodies + 1) * LIGHT
+        yield which, group, light, (light * APART).astype(np.float32)
+
+    def _mixed(self, look: Look, shares: NDArray[np.float64], verdict: NDArray[np.int8]) -> None:
+        which, group = np.nonzero((shares > 0) & (verdict == DONE)[:, None])
+        self.found.append((look.pixels[which], look.bodies[which, group].astype(np.int64), shares[which, group]))
+
     def shares(self, pixels: Whole) -> list[Shares]:
         """Return the shares of pixels."""
-        half, count = np.full(len(pixels), UNITS / 2, np.float32), len(pixels)
+        half, many = np.full(len(pixels), UNITS / 2, np.float32), self.lens.size
         self.look_around(Places(pixels.astype(np.int32), half, half))
-        kernels.encode(self.points.light[: self.lens.size], self.curve, self.points.code)
-        corners, places = np.empty((count, 4), np.int32), _places(4 * count)
-        corner_of = np.full((self.lens.size, 4), -1, np.int32)
-        new = kernels.open_pixels(pixels, self.lens, corner_of, self._count, corners, places)
-        self._look(_part(places, slice(new)))
-        verdict, groups = np.empty(count, np.int8), np.zeros(count, np.int8)
-        kernels.judge(
-            pixels, corners, self.points, self.wanted.error, self.lens, self.sums, verdict, groups,
-            np.empty(count, np.float32), np.empty(self.lens.size, np.bool_),
-        )  # fmt: skip
+        kernels.encode(self.points.light[:many], self.curve, self.points.code)
+        steps, opened = np.zeros(many, np.float32), np.zeros(many, np.bool_)
+        kernels.doubtful(self.points, self.lens, self.own, self.wanted.error, steps, np.empty(many, np.bool_))
+        self._look_beyond(steps, steps)
+        doubtful, left = steps > 0, [pixels[:0]]
         if len(self.sight.rods):
-            verdict[self._touched(pixels)[0]] = OPEN
-        cut = np.flatnonzero(verdict == CUT)
-        if len(cut):
-            verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])
-        cut, done = np.flatnonzero(verdict == CUT), np.flatnonzero(verdict == kernels.DONE)
-        whole = pixels[done], self.points.body[pixels[done]].astype(np.int64), np.ones(len(done))
-        return [whole, self._two(pixels[cut], corners[cut]), self._sampled(pixels[verdict == OPEN])]
-
-    def _two(self, pixels: Whole, corners: NDArray[np.int32]) -> Shares:
-        """Return the shares of two bodies, by the mean of their lights."""
-        bodies = np.sort(self.points.body[corners].astype(np.int64), axis=1)[:, [0, 3]]
-        light = (bodies + 1) * LIGHT
-        second = (self.sums[pixels, 0] - light[:, 0]) / (light[:, 1] - light[:, 0])
-        return np.repeat(pixels, 2), bodies.reshape(-1), np.stack([1 - second, second], axis=1).reshape(-1)
+            left.append(pixels[self._touched(pixels)[0]])
+            opened[left[-1]] = True
+        for _ in range(FOLLOWED):
+            some = np.flatnonzero(doubtful & ~opened)
+            if not len(some):
+                break
+            opened[some] = True
+            left.append(self._part_pixels(some, steps, doubtful) if self._parts_pixels() else some)
+        whole = pixels[~opened[pixels]]
+        alone = whole, self.points.body[whole].astype(np.int64), np.ones(len(whole))
+        return [alone, *self.found, self._sampled(np.concatenate(left))]
 
     def _sampled(self, pixels: Whole) -> Shares:
         s, counted = self.sight, [np.empty(0, np.int64)]

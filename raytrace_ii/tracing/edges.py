@@ -14,9 +14,10 @@ more where the picture is rougher. What the filter of textures errs alike in all
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,15 +25,16 @@ from numpy.typing import NDArray
 from ii_core import IICamera
 
 from ..scene.scene import Scene
+from .intersect import Hits
 from .kernels import cells as kernels
-from .kernels.cells import CUT, DONE, MISSED, OPEN, UNITS, Places, Points, Sides
+from .kernels.cells import ANGLES, DONE, GROUPS, MISSED, OPEN, PICKS, UNITS, Places, Points, Seen
 from .kernels.sampling import lobe_keys
 from .kernels.sampling import places as set_places
 from .sample_places import fixed_places
+from .kernels.tables import ALL_COLUMNS
 from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
 
-ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
 # Numbers of samples of pixels that are no cells. Others above 16 miss more of an edge than these in turn.
 SETS = np.array([2, 3, 4, 6, 9, 12, 16, 32, 64, 128, 256])
 GOLDEN = (5**0.5 - 1) / 2  # multiples of it share pixels out evenly
@@ -44,9 +46,13 @@ PILOTS, OF_PILOTS = 768, (4, 9)  # pixels of a tile that get two sets, which tel
 PILOTS_FILTER = 0.6  # times the width of a set's filter: what that errs alike in all sets scatters
 ALIKE = 0.8  # square of the difference of both in parts of the sum of the squares of their errors
 EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per roughness; powers of n by which it falls
+FIRST, FIRST_MISS = (4, 8, 16), np.array([0.088, 0.052, 0.031])  # places looked at first, and by what they miss
+TAU = 1.5  # how much more than the error wanted surfaces may cause in one pixel
+LOOKS, IN_LINE, SPLIT = 4, 16, 16384  # most looks at a pixel, places around a line, rays at a time
+OF_PART = 0.7  # width of a surface's part of a pixel
+TO_SIDES = np.array([(0.5, 0.5), (1.0, 0.5), (0.5, 1.0)])  # places between whose rays all others are
 FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
-DONE_ERROR, CUT_ERROR = 0.5, 0.9  # of cells, in parts of the error wanted
-FOLLOWED, OF_THIN = 64, 16  # how far a thin body is followed, in pixels, and samples to find it
+FOLLOWED = 64  # how far a thin body is followed, in pixels
 WHITE = 255.0  # code
 SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 5 ns a pixel each
 THIN = 0.75  # pixels across a body, wider ones cover centres and corners all along
@@ -54,10 +60,8 @@ OF_SMALL = 16, 64  # least and most samples where a small or thin body may be
 IN_STRIP, OF_STRIP = 2, (4, 64)  # how much fewer in a strip around it, which has little of the pixel
 SHIFTS = 0.7549, 0.5698  # multiples of them share a square out evenly
 OF_ROD = 500  # vertices that tell the longest axis of a body
-OF_BOX = 1000  # pixels that tell where the content is
-FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
 FINEST = 4096  # places in a pixel along each side that have keys of their own
-RECORDED = frozenset({"object_id", "shading_normal", "ray_length"})  # what centres have to record
+RECORDED = frozenset({"object_id", "shading_normal"})  # what centres have to record
 
 Floats = NDArray[np.float64]
 Radiance = NDArray[np.float32]
@@ -84,6 +88,37 @@ class Sight:
     check: Callable[[], None]
 
 
+@dataclass(frozen=True)
+class Look:
+    """Places (p, n, 2) of pixels, their weights, what is `Seen` there, and rays (p, 3, 3) as of `kernels.aim`.
+
+    ``light`` (p, `GROUPS`, 3), ``codes``, their least and greatest and ``bodies`` are those of the first surfaces, as
+    many as are ``known``, from samples that ``count`` counts; ``turn`` is that of `kernels.fit`.
+    """
+
+    pixels: NDArray[np.int64]
+    L: Floats
+    D: Floats
+    places: Floats
+    weights: Floats
+    seen: Seen
+    light: Radiance
+    codes: Radiance
+    low: Radiance
+    high: Radiance
+    bodies: Whole
+    count: Whole
+    known: NDArray[np.int64]
+    turn: Floats
+
+    def of(self, which: NDArray[np.bool_]) -> Look:
+        """Return the rows of some of the pixels."""
+        count, rows = self.places.shape[1], np.flatnonzero(which)
+        samples = (rows[:, None] * count + np.arange(count)).reshape(-1)
+        fields = {name: value[rows] for name, value in vars(self).items() if name != "seen"}
+        return Look(**fields, seen=_part(self.seen, samples))
+
+
 @dataclass
 class Cells:
     """Pixels of a tile and its rim in rows: columns and rows in the picture, lenses, and what is seen of them.
@@ -98,10 +133,12 @@ class Cells:
     n: NDArray[np.int64]
     lens: NDArray[np.int64]
     own: NDArray[np.bool_]
+    by_body: ClassVar[bool] = False  # whether all of a body is one surface
     points: Points = field(init=False)
     rays: Whole = field(init=False)
     sums: Floats = field(init=False)
     verdicts: NDArray[np.int8] = field(init=False)
+    squares: float = field(init=False, default=0.0)
     _count: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -113,38 +150,186 @@ class Cells:
         self.rays, self.sums = np.ones(n, np.int32), np.zeros((n, 3))
         self.verdicts = np.full(n, -1, np.int8)
 
-    def look_around(self, centres: Places, finer: float = FINER) -> None:
+    def look_around(self, centres: Places, finer: float = 1.0) -> None:
         """Look at centres of pixels, of the rim as a rule."""
         first = self._look(centres, finer=finer)
         for array in self.points:
             array[centres.pixel] = array[first : self._count]
         self._count = first
 
-    def refine(self, inside: NDArray[np.int64], reach: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def refine(self, inside: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Find the light, `sums`, of all pixels whose centres do not tell it; return which they are.
 
-        ``inside`` are the own pixels in the order of the tile's rays, ``reach`` the lengths of all pixels' rays.
+        ``inside`` are the own pixels in the order of the tile's rays.
         """
         many, error = self.lens.size, LOOSE * self.wanted.error
         steps, rough, opened = np.zeros(many, np.float32), np.zeros(many, np.float32), np.zeros(many, np.bool_)
         kernels.encode(self.points.light[: self._count], self.curve, self.points.code)
-        kernels.doubtful(self.points, self.lens, self.own, error, steps)
+        kernels.doubtful(self.points, self.lens, self.own, error, steps, uneven := np.empty(many, np.bool_))
         kernels.roughness(self.points, self.lens, np.empty((many, 2), np.float32), rough)
         self._look_beyond(steps, rough)
         doubtful = steps > 0
         if len(self.sight.rods):
             opened[self._small(inside)] = True
-        left, thin = [], np.zeros(many, np.bool_)
-        corner_of = np.full((many, 4), -1, np.int32)
-        for _ in range(ROUNDS):
+        if not self._parts_pixels():
+            uneven = doubtful
+        left = [np.flatnonzero(uneven & doubtful & ~opened)]
+        opened[left[0]] = True
+        for _ in range(FOLLOWED):
             pixels = np.flatnonzero(doubtful & ~opened & self.own)
             if not len(pixels):
                 break
             opened[pixels] = True
-            left.append(self._open(self._near_together(pixels, reach), corner_of, doubtful, rough, thin))
-        self._share_out(np.concatenate(left or [inside[:0]]), rough)
-        self._follow(thin, opened)
+            left.append(self._part_pixels(pixels, steps, doubtful))
+        self._share_out(np.concatenate(left), rough)
         return opened
+
+    def _parts_pixels(self) -> bool:
+        """Return whether visibility alone parts pixels: no face is passed, and all rays carry the same light."""
+        s = self.sight
+        return s.tracer.sees_bodies and s.camera.weighted_rays_at(0, 0)[2] is None
+
+    def _part_pixels(
+        self, pixels: NDArray[np.int64], steps: NDArray[np.float32], doubtful: NDArray[np.bool_]
+    ) -> NDArray[np.int64]:
+        """Find the light of pixels by the shares of the surfaces seen in them; return those that need samples."""
+        step, limit, left = steps[pixels], TAU * self.wanted.error, [pixels[:0]]
+        for number, (low, high) in zip(FIRST, pairwise((0.0, *(limit / FIRST_MISS[:-1]), np.inf)), strict=True):
+            some = pixels[(step > low) & (step <= high) | (step == 0) & (number == FIRST[-1])]
+            for start in range(0, len(some), SPLIT // number):
+                left += self._mix(self._first_look(some[start : start + SPLIT // number], number), limit, doubtful)
+        return np.concatenate(left)
+
+    def _mix(self, look: Look, limit: float, doubtful: NDArray[np.bool_]) -> Iterator[NDArray[np.int64]]:
+        """Yield those of the pixels looked at that need samples; find the light of the others."""
+        for stage in range(LOOKS):
+            groups, many = self._surfaces(look)
+            self._shade(look, groups, many)
+            count = len(look.pixels)
+            shares, errors, strip = np.empty((count, GROUPS)), np.empty(count), np.empty((count, 6))
+            kernels.fit(
+                look.places, groups, many, look.weights, look.turn, np.empty((4, ANGLES)), shares, errors, strip
+            )  # fmt: skip
+            kernels.contrast(many, look.codes, errors)
+            more = (errors > limit) & (many <= GROUPS) & (stage < LOOKS - 1)
+            done, verdict = look.of(~more), np.empty(np.count_nonzero(~more), np.int8)
+            kernels.mix(
+                done.pixels, done.places, groups[~more], many[~more], done.bodies, shares[~more], done.light,
+                done.codes, done.low, done.high, self.points, self.wanted.error, self.lens, self.sums, verdict, doubtful,
+            )  # fmt: skip
+            self.verdicts[done.pixels] = verdict
+            self._mixed(done, shares[~more], verdict)
+            self.squares += float(np.sum(errors[~more][verdict == DONE] ** 2))
+            yield done.pixels[verdict == OPEN]
+            straight = strip[:, 5] > 0
+            if (more & ~straight).any():
+                yield from self._mix(self._more(look.of(more & ~straight)), limit, doubtful)
+            if not (more & straight).any():
+                break
+            look = self._in_strips(look.of(more & straight), strip[more & straight])
+
+    def _mixed(self, look: Look, shares: Floats, verdict: NDArray[np.int8]) -> None:
+        """Note the shares of surfaces."""
+
+    def _first_look(self, pixels: NDArray[np.int64], number: int) -> Look:
+        """Look at the centres of pixels and at a set of places in them."""
+        count, s = len(pixels), self.sight
+        L, D, _ = s.camera.weighted_rays_at(self.m[pixels][:, None], self.n[pixels][:, None], TO_SIDES)
+        places, weights = np.full((count, number, 2), 0.5), np.full((count, number), 1 / (number - 1))
+        places[:, 1:] = self._set(pixels, number - 1, fixed_places(number - 1))
+        weights[:, 0] = 0
+        look = Look(
+            pixels, L, D, places, weights, self._see(pixels, L, D, places),
+            *(np.zeros((count, GROUPS, 3), np.float32) for _ in range(4)), np.full((count, GROUPS), -2, np.int32),
+            np.zeros((count, GROUPS), np.int32), np.zeros(count, np.int64), np.tile((np.pi / 2, np.pi / 2), (count, 1)),
+        )  # fmt: skip
+        look.bodies[:, 0] = self.points.body[pixels]
+        return look
+
+    def _more(self, look: Look) -> Look:
+        """Look at three times as many places of pixels again."""
+        old = look.places.shape[1]
+        places = self._set(look.pixels, 3 * old, fixed_places(0))
+        parts = np.array([old, 3 * old]) ** 1.5
+        weights = np.concatenate([look.weights * parts[0] / parts.sum(), np.full(places.shape[:2], parts[1] / parts.sum() / (3 * old))], axis=1)
+        return self._joined(look, places, weights)
+
+    def _in_strips(self, look: Look, strip: Floats) -> Look:
+        """Look at places in strips of pixels, too."""
+        places = self._set(look.pixels, IN_LINE, fixed_places(IN_LINE))
+        weights = np.empty((len(places), look.places.shape[1] + IN_LINE))
+        kernels.into_strips(strip, places, look.places, weights)
+        return self._joined(look, places, weights)
+
+    def _joined(self, look: Look, places: Floats, weights: Floats) -> Look:
+        seen = self._see(look.pixels, look.L, look.D, places)
+        count = len(places)
+        both = [
+            np.concatenate([a.reshape(count, -1, *a.shape[1:]), b.reshape(count, -1, *b.shape[1:])], axis=1)
+            for a, b in zip(look.seen, seen, strict=True)
+        ]
+        arrays: list[Any] = [a.reshape(-1, *a.shape[2:]) for a in both]
+        return replace(look, places=np.concatenate([look.places, places], axis=1), weights=weights, seen=Seen(*arrays))
+
+    def _set(self, pixels: NDArray[np.int64], number: int, table: Floats) -> Floats:
+        out = np.empty((len(pixels) * number, 2))
+        set_places(self.sight.seed, self.m[pixels], self.n[pixels], self.sight.camera.pixels[0], 0, number, 0, table, out)
+        return out.reshape(-1, number, 2)
+
+    def _see(self, pixels: NDArray[np.int64], L: Floats, D: Floats, places: Floats) -> Seen:
+        """Return what is seen through places (p, n, 2) of pixels, by visibility alone."""
+        s, rays = self.sight, places.shape[0] * places.shape[1]
+        s.check()
+        origins, directions = np.empty((rays, 3), np.float32), np.empty((rays, 3), np.float32)
+        kernels.aim(L, D, places, s.tracer.pose[:3, :3], s.tracer.pose[:3, 3], origins, directions)
+        self.rays[pixels] += places.shape[1]
+        return Seen(origins, directions, *s.tracer.seen(origins, directions))
+
+    def _surfaces(self, look: Look) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        """Return the surfaces of samples, and how many a pixel has."""
+        count, number = look.places.shape[:2]
+        groups, many = np.empty((count, number), np.uint8), np.empty(count, np.int64)
+        faces = self.sight.tracer.scene.surfaces
+        kernels.part(
+            look.seen, look.places, faces.rows, faces.columns, faces.columns == ALL_COLUMNS, self.by_body,
+            *self.sight.pixel, np.empty((GROUPS, 7)), groups, many,
+        )  # fmt: skip
+        return groups, many
+
+    def _shade(self, look: Look, groups: NDArray[np.uint8], many: NDArray[np.int64]) -> None:
+        """Find the light of surfaces that have none yet, by samples of each."""
+        kernels.pick(look.places, groups, many, look.known, picks := np.empty((len(many), GROUPS, PICKS), np.int32))
+        centres = np.flatnonzero(look.known == 0)
+        picks[centres, 0, 0] = -1
+        look.known[:] = np.maximum(look.known, np.minimum(many, GROUPS))
+        for which, group, light, codes in self._lights(look, picks, centres):
+            kernels.take_light(
+                which, group, light, codes, look.light, look.codes, look.low, look.high, look.count
+            )  # fmt: skip
+
+    def _lights(self, look: Look, picks: Whole, centres: NDArray[np.int64]) -> Iterator[tuple[Any, Any, Radiance, Radiance]]:
+        """Yield rows of pixels, surfaces, light and codes of samples picked."""
+        pixels = look.pixels[centres]
+        yield centres, np.zeros_like(centres), self.points.light[pixels], self.points.code[pixels]
+        which, group, pick = np.nonzero(picks >= 0)
+        if not len(which):
+            return
+        at = which * look.places.shape[1] + picks[which, group, pick]
+        origins, directions, *found = (array[at] for array in look.seen)
+        hits = Hits(*found)
+        s, tracer = self.sight, self.sight.tracer
+        keys = None
+        if tracer.scene.glossy:
+            place = (look.places.reshape(-1, 2)[at] * FINEST).astype(np.int64)
+            keys = np.empty(len(at), np.uint64)
+            m, n = self.m[look.pixels[which]], self.n[look.pixels[which]]
+            across, down = FINEST * m + place[:, 0], FINEST * n + place[:, 1]
+            lobe_keys(s.seed, across, down, FINEST * s.camera.pixels[0] + 1, 0, 1, keys)
+        tracer.footprint, tracer.lobes = (s.width[0] * OF_PART, s.width[1] * OF_PART), (LOBE_RAYS, 1)
+        light = tracer.shade(origins, directions, hits, keys)
+        kernels.encode(light, self.curve, codes := np.empty_like(light))
+        look.bodies[which, group] = np.where(hits.faces >= 0, tracer.scene.object_of_face[hits.faces], -1)
+        yield which, group, light, codes
 
     def dense(self, some: NDArray[np.int64]) -> bool:
         """Tell by some of the pixels whether sets in all of them are worth more than looking for edges."""
@@ -154,7 +339,7 @@ class Cells:
         own[some] = True
         lens, crowded = np.where(own.reshape(self.lens.shape), self.lens, -1), np.empty(self.lens.size, np.bool_)
         steps = np.empty(self.lens.size, np.float32)
-        kernels.doubtful(self.points, lens, own, LOOSE * self.wanted.error, steps)
+        kernels.doubtful(self.points, lens, own, LOOSE * self.wanted.error, steps, np.empty(len(steps), np.bool_))
         kernels.crowded(self.points, lens, steps, crowded)
         return bool(np.count_nonzero(crowded) > DENSE * len(some))
 
@@ -238,94 +423,7 @@ class Cells:
             )  # fmt: skip
             kernels.add_shares(light, shares, pixels[some], self.sums)
 
-    def _near_together(self, pixels: NDArray[np.int64], reach: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Return pixels in an order in which the edges that they see are close to each other in the scene.
-
-        Rays and shadow rays of one packet then meet the same things: they take 311 instead of 436 ns (*Apples*,
-        `setup1` at scale 4, 2026-11-25). An edge belongs to the nearest body around the pixel.
-        """
-        near = np.empty(self.lens.size, np.float32)
-        kernels.nearest_around(reach, self.lens, near)
-        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
-        far = near[pixels]
-        known = np.isfinite(far)
-        far[~known] = np.median(far[known]) if known.any() else 1.0
-        some = slice(None, None, -(-len(pixels) // OF_BOX))
-        length = np.linalg.norm(D[some], axis=-1)
-        ends = L[some] + D[some] * (far[some] / np.where(length > 0, length, 1.0))[:, None]
-        low, high = np.percentile(ends, (1, 99), axis=0)
-        boxes = np.empty(len(pixels), np.uint16)
-        kernels.boxes(L, D, far, low, 32 / np.maximum(high - low, 1e-9), boxes)
-        return pixels[np.argsort(boxes, kind="stable")]
-
-    def _open(
-        self, pixels: NDArray[np.int64], corner_of: Whole, wanted: NDArray[np.bool_], rough: NDArray[np.float32],
-        thin: NDArray[np.bool_],
-    ) -> NDArray[np.int64]:  # fmt: skip
-        """Find the light of pixels as cells between their corners; return those that are none."""
-        count = len(pixels)
-        corners, places = np.empty((count, 4), np.int32), _places(4 * count)
-        new = kernels.open_pixels(pixels, self.lens, corner_of, self._count, corners, places)
-        self._look(_part(places, slice(new)))
-        verdict, groups, steps = np.empty(count, np.int8), np.zeros(count, np.int8), np.zeros(count, np.float32)
-        kernels.judge(
-            pixels, corners, self.points, LOOSE * self.wanted.error, self.lens, self.sums, verdict, groups, steps,
-            wanted,
-        )  # fmt: skip
-        kernels.find_thin(pixels, corners, self.points, LOOSE * self.wanted.error, self.lens, thin)
-        cut = np.flatnonzero(verdict == CUT)
-        if len(cut):
-            verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])
-        self.verdicts[pixels] = verdict
-        left = verdict == OPEN
-        rough[pixels[left]] = steps[left] ** 2 / 3
-        return pixels[left]
-
-    def _follow(self, thin: NDArray[np.bool_], opened: NDArray[np.bool_]) -> None:
-        """Find the light of pixels in which a thin body may go on that was met nearby, as far as it does."""
-        calm = self.own & (self.verdicts != OPEN)
-        pixels = np.flatnonzero(thin & calm)
-        for _ in range(FOLLOWED):
-            if not len(pixels):
-                break
-            calm[pixels], opened[pixels], thin[:] = False, True, False
-            self._sample(pixels, np.full(len(pixels), OF_THIN))
-            light = self.sums[pixels].astype(np.float32)
-            kernels.encode(light, self.curve, codes := np.empty_like(light))
-            kernels.follow(pixels, codes, self.points, LOOSE * self.wanted.error, self.lens, thin)
-            pixels = np.flatnonzero(thin & calm & (self.verdicts != CUT))
-
-    def _cut(self, pixels: NDArray[np.int64], corners: Whole, groups: NDArray[np.int8]) -> NDArray[np.int8]:
-        """Find the light of cells with one edge; return which of them turn out to have none, or more."""
-        many, error = len(pixels), LOOSE * self.wanted.error
-        of_cell, sides = np.empty((many, 4), np.int32), _sides(2 * many)
-        side_of = np.full((self.lens.size, 4), -1, np.int32)
-        made = kernels.gather_sides(pixels, corners, groups, self.lens, side_of, sides, of_cell)
-        sides = _part(sides, slice(made))
-        by_body = self.sight.tracer.sees_bodies
-        while True:
-            which, places = np.empty(made, np.int32), _places(made)
-            seen, shaded = kernels.probe_sides(sides, self.points, error, by_body, which, places)
-            if not seen + shaded:
-                break
-            for part, bodies in ((slice(seen), True), (slice(made - shaded, made), False)):
-                if part.stop > (part.start or 0):
-                    first = self._look(_part(places, part), bodies)
-                    kernels.narrow_sides(sides, which[part], first, self.points)
-                    self._count = first  # they are not needed again
-        shares, places, verdict = np.empty(many), _places(2 * many), np.empty(many, np.int8)
-        kernels.chords(pixels, corners, groups, of_cell, sides, self.points, error, verdict, shares, places)
-        sure = np.flatnonzero(verdict == CUT)
-        beside = self._look(_part(places, np.stack([2 * sure, 2 * sure + 1], axis=1).reshape(-1)))
-        checked = verdict[sure]
-        kernels.confirm(
-            pixels[sure], corners[sure], groups[sure], shares[sure], beside, self.points, error, checked, self.sums
-        )
-        self._count = beside
-        verdict[sure] = checked
-        return verdict
-
-    def _look(self, places: Places, bodies: bool = False, finer: float = FINER) -> int:
+    def _look(self, places: Places, bodies: bool = False, finer: float = 1.0) -> int:
         """Look at places; return the row of the first of their points, of which ``bodies`` alone may be wanted."""
         first, n, s = self._count, len(places.pixel), self.sight
         self._count += n
@@ -371,10 +469,10 @@ class Cells:
             np.rint(8 * np.log2(weights)).astype(np.int64), return_inverse=True, return_counts=True
         )
         weights = 2.0 ** (eighths / 8)
-        done, cut = (int(np.count_nonzero(self.verdicts == verdict)) for verdict in (DONE, CUT))
+        done = int(np.count_nonzero(self.verdicts == DONE))
         expected = weights**SPREAD_ERROR / np.average(weights**SPREAD_ERROR, weights=times)
         least = (EDGE * weights / (FAR * error) ** 2) ** (1 / EDGES_FALL)
-        squares = error**2 * (len(pixels) + done * (1 - DONE_ERROR**2) + cut * (1 - CUT_ERROR**2))
+        squares = max(error**2 * (len(pixels) + done) - self.squares, error**2 * len(pixels))
         of_sets = edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS
         low, high = -10.0, 10.0
         for _ in range(30):
@@ -498,21 +596,20 @@ def edge_mean(
     rim = ~own & needed(lens, own)
     lens = np.where((own | rim).reshape(lens.shape), lens, -1)
     cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, own)
-    inside, points, reach = np.flatnonzero(own)[order], cells.points, np.full(lens.size, np.nan, np.float32)
-    assert seen.object_id is not None and seen.shading_normal is not None and seen.ray_length is not None
-    points.light[inside], points.body[inside] = centres, seen.object_id
-    points.normal[inside], reach[inside] = seen.shading_normal, seen.ray_length
+    inside, points = np.flatnonzero(own)[order], cells.points
+    assert seen.object_id is not None and seen.shading_normal is not None
+    points.light[inside], points.body[inside], points.normal[inside] = centres, seen.object_id, seen.shading_normal
     around = np.flatnonzero(rim)
     if len(around):
         half = np.full(len(around), UNITS / 2, np.float32)
         cells.look_around(Places(around.astype(np.int32), half, half))
-    opened = cells.refine(inside, reach)[inside]
+    opened = cells.refine(inside)[inside]
     found = centres.copy()
     found[opened] = cells.sums[inside[opened]]
     return found, cells.rays[inside]
 
 
-Table = TypeVar("Table", Points, Places, Sides)
+Table = TypeVar("Table", Points, Places, Seen)
 
 
 def _part(table: Table, rows: slice | NDArray[np.int64]) -> Table:
@@ -529,8 +626,3 @@ def _grown(points: Points, kept: int, room: int) -> Points:
 
 def _places(n: int) -> Places:
     return Places(np.empty(n, np.int32), np.empty(n, np.float32), np.empty(n, np.float32))
-
-
-def _sides(n: int) -> Sides:
-    whole = [np.empty(n, np.int32) for _ in range(4)]
-    return Sides(whole[0], whole[1], np.empty((n, 2), np.int32), whole[2], whole[3], np.empty(n, np.bool_))

@@ -303,6 +303,24 @@ class Tracer:
         found[room.pixels[:n]] = np.where(faces >= 0, self.scene.object_of_face[faces], -1)
         return found
 
+    def seen(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> Hits:
+        """Return the nearest hits of rays in the scene's frame, as Embree places them: see `sees_bodies`."""
+        self.count.rays["primary"] += len(origins)
+        return self._nearest(origins, directions, placed=False)
+
+    def shade(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], hits: Hits,
+        keys: NDArray[np.uint64] | None,
+    ) -> NDArray[np.float32]:  # fmt: skip
+        """Return the light (n, 3) that camera rays of `seen` bring; ``keys`` are as of `run`."""
+        room, n = self._primary._replace(pixels=self._pixels), len(origins)
+        room.origins[:n], room.directions[:n], room.weights[:n], room.inside[:n] = origins, directions, 1, -1
+        if keys is not None:
+            room.keys[:n] = keys
+        self._trace(room, n, radiance := np.zeros((n, 3), np.float32), None, _NO_START, hits)
+        self.count.rays["primary"] -= n  # they are counted
+        return radiance
+
     @property
     def sees_bodies(self) -> bool:
         """Whether the nearest face of a ray is there: not cut out, not within another body, not seen through."""
@@ -356,9 +374,10 @@ class Tracer:
         return self._told[1]
 
     def _trace(
-        self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None, start: Start
-    ) -> None:
-        """Trace the first n of the primary rays."""
+        self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None, start: Start,
+        hits: Hits = _NO_HITS,
+    ) -> None:  # fmt: skip
+        """Trace the first n of the primary rays, whose nearest hits may be known."""
         rays = _rows(primary, slice(n))
         self.count.rays["primary"] += n
         if self.scene.transmits and not len(start.rows):
@@ -366,18 +385,19 @@ class Tracer:
         for depth in range(self.max_depth + 1):
             lobe_rays = self.lobes[0] if depth == 0 else 1
             spawn = depth < self.max_depth
-            rays = self._generation(start, rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
-            start = _NO_START
+            rays = self._generation(start, rays, radiance, support if depth == 0 else None, spawn, lobe_rays, hits)
+            start, hits = _NO_START, _NO_HITS
             if not len(rays.pixels):
                 break
 
     def _generation(
         self, start: Start, rays: Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool,
-        lobe_rays: int,
+        lobe_rays: int, hits: Hits,
     ) -> Rays:  # fmt: skip
-        """Trace and shade one generation; the next one comes back."""
+        """Trace and shade one generation, whose hits may be known; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
-        hits = _NO_HITS if self._finds else self._hits(rays)
+        if not self._finds and not len(hits.faces):
+            hits = self._hits(rays)
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
         through, mirrored = n * (s.transmits + 2 * s.disperses + s.blends), n * (lobe_rays if s.glossy else 1)
         following = _room(through + mirrored if spawn else 0, s.nested, s.glossy, any(self.footprint))

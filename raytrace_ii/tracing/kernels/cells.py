@@ -15,20 +15,25 @@ from numpy.typing import NDArray
 from ii_core.base.jit import inline_kernel
 from ii_core.base.jit import lean_kernel as kernel
 
-UNITS = 1024  # of a pixel's side: edges are found on whole ones
-DONE, CUT, OPEN = 0, 1, 2  # what becomes of a cell
-FIRST, SECOND, NEITHER = 0, 1, 2  # groups of points
+from .tables import BODY, FACE, NORMALS
+
+UNITS = 1024  # of a pixel's side
+DONE, OPEN = 0, 2  # what becomes of a pixel
+GROUPS, ANGLES = 4, 16  # surfaces in a pixel, angles of the lines that part two
+PICKS = 3  # samples of a surface whose light is found
 # Share of a step of colour by which a pixel is wrong that an edge of this step crosses unseen, root mean square.
 MISSED = 0.3
 SAME_WAY = np.float32(0.94)  # least cosine between normals of one surface
-WITHIN = 1.5  # how much more than pixels' centres the colours of one group of a cell may differ
-OWN = 0.3  # of the step between two colours: how far a point of one may be from it
+BEHIND = 2.0  # pixels to the plane of a surface, from which on it is another one
+OF_COUNTS = 0.25  # standard error of a share by samples, for one sample; it falls by their 3/4th power
+THINNEST = 0.002  # of a pixel, on either side of lines
+UNLIKE = 1.5  # how much more than the error wanted colours of one surface beside each other may cause
+BESIDE = 0.25  # of a pixel: samples so near to a side tell of the pixel beyond
 HALF_DIAGONAL = 0.75  # of a pixel, with something to spare
 WIDER, SPARE = 1.02, 0.01  # how much wider than rods strips around them are, times and in pixels
 MOST_STRIP = 0.5  # of a pixel
-LEAST_AWAY = 0.02  # pixels beside a chord at which it is checked
-LIKE = 0.4  # the same among the pixels around one
-MOST_GROUPS = 3  # of surfaces and colours around a pixel that is looked at as a cell
+LIKE = 0.4  # of a step, among the pixels around one
+MOST_GROUPS = 3  # of surfaces and colours around a pixel of a tile without fine structure
 
 
 class Points(NamedTuple):
@@ -48,16 +53,15 @@ class Places(NamedTuple):
     y: NDArray[np.float32]
 
 
-class Sides(NamedTuple):
-    """Sides of cells on which an edge is looked for: pixel, which of its sides, points at the left or upper end and
-    at the other, what is left of the way between them in units, and whether a third group was met."""
+class Seen(NamedTuple):
+    """Rays through places of pixels in the scene's frame, and what they hit, a row each."""
 
-    pixel: NDArray[np.int32]
-    side: NDArray[np.int32]
-    ends: NDArray[np.int32]
-    low: NDArray[np.int32]
-    high: NDArray[np.int32]
-    bad: NDArray[np.bool_]
+    origins: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    faces: NDArray[np.int32]
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
+    distances: NDArray[np.float32]
 
 
 @kernel
@@ -97,32 +101,61 @@ def _one_surface(points, i, j):
 
 
 @kernel
-def doubtful(points, lens, own, error, steps):
+def doubtful(points, lens, own, error, steps, uneven):
     """Steps of colour, in codes, of the own pixels that may not be what is seen at their centres; 0 of others.
 
-    To a neighbour of another surface the whole step counts; on one surface, what a straight run of colours leaves.
-    At the border of a lens it is the step to the neighbour on the other side.
+    To a neighbour of another surface the whole step counts; on one surface, what a straight run of colours leaves:
+    pixels are ``uneven`` by that alone. At the border of a lens it is the step to the neighbour on the other side.
     """
     height, width = lens.shape
     for y in range(height):
         for x in range(width):
             i = y * width + x
-            most = np.float32(0)
+            most, bent = np.float32(0), np.float32(0)
             if own[i]:
                 for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
-                    one, other = -1, -1
-                    if 0 <= y - dy and 0 <= x - dx < width and lens[y - dy, x - dx] == lens[y, x]:
-                        one = (y - dy) * width + x - dx
-                    if y + dy < height and 0 <= x + dx < width and lens[y + dy, x + dx] == lens[y, x]:
-                        other = (y + dy) * width + x + dx
-                    if one >= 0 and other >= 0 and _one_surface(points, i, one) and _one_surface(points, i, other):
-                        for c in range(3):
-                            bend = points.code[one, c] - 2 * points.code[i, c] + points.code[other, c]
-                            most = max(most, abs(bend))
+                    one, other = _beside(lens, y, x, -dy, -dx), _beside(lens, y, x, dy, dx)
+                    first, second = one >= 0, other >= 0
+                    first, second = first and _one_surface(points, i, one), second and _one_surface(points, i, other)
+                    if first and second:
+                        bent = max(bent, _bend(points, one, i, other))
                     else:
-                        most = max(most, _apart(points, i, one) if one >= 0 else np.float32(0))
-                        most = max(most, _apart(points, i, other) if other >= 0 else np.float32(0))
+                        if first:
+                            bent = max(bent, _run(points, lens, i, one, _beside(lens, y, x, -2 * dy, -2 * dx)))
+                        elif one >= 0:
+                            most = max(most, _apart(points, i, one))
+                        if second:
+                            bent = max(bent, _run(points, lens, i, other, _beside(lens, y, x, 2 * dy, 2 * dx)))
+                        elif other >= 0:
+                            most = max(most, _apart(points, i, other))
+            uneven[i] = bent * MISSED > error
+            most = max(most, bent)
             steps[i] = most if most * MISSED > error else np.float32(0)
+
+
+@inline_kernel
+def _beside(lens, y, x, dy, dx):
+    """A pixel under the same lens so far away; −1 if there is none."""
+    height, width = lens.shape
+    b, a = y + dy, x + dx
+    return b * width + a if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x] else -1
+
+
+@inline_kernel
+def _bend(points, one, i, other):
+    bend = np.float32(0)
+    for c in range(3):
+        bend = max(bend, abs(points.code[one, c] - 2 * points.code[i, c] + points.code[other, c]))
+    return bend
+
+
+@inline_kernel
+def _run(points, lens, i, one, after):
+    """The step to a neighbour on one side, or what a straight run of colours beyond it leaves."""
+    step = _apart(points, i, one)
+    if after >= 0 and _one_surface(points, one, after):
+        step = min(step, _bend(points, i, one, after))
+    return step
 
 
 @kernel
@@ -368,352 +401,299 @@ def add_shares(light, shares, pixels, sums):
             sums[pixels[i], c] = total
 
 
-@inline_kernel
-def _right_down(corner):
-    """A corner's place, in pixels right and down; corners and sides run around from the left top, side 0 on top."""
-    return int(corner == 1 or corner == 2), int(corner >= 2)
+@kernel
+def aim(locations, directions, places, rotation, shift, origins, out):
+    """Rays (p·n, 3) through places (p, n, 2) of pixels, in the scene's frame and of length 1.
+
+    They are even between those (p, 3, 3) through the centre, the middle of the right side and that of the lower one.
+    """
+    count = places.shape[1]
+    for i in range(places.shape[0]):
+        for j in range(count):
+            a, b, row = 2.0 * places[i, j, 0] - 1.0, 2.0 * places[i, j, 1] - 1.0, i * count + j
+            square = 0.0
+            for c in range(3):
+                place, way = shift[c], 0.0
+                for k in range(3):
+                    l, d = locations[i, 0, k], directions[i, 0, k]
+                    place += rotation[c, k] * (l + a * (locations[i, 1, k] - l) + b * (locations[i, 2, k] - l))
+                    way += rotation[c, k] * (d + a * (directions[i, 1, k] - d) + b * (directions[i, 2, k] - d))
+                origins[row, c], out[row, c] = place, way
+                square += way * way
+            inverse = 1.0 / math.sqrt(square) if square > 0.0 else 0.0
+            for c in range(3):
+                out[row, c] *= inverse
 
 
 @kernel
-def open_pixels(pixels, lens, corner_of, next_point, corners, places):
-    """Give pixels their corners, which pixels under one lens share.
+def part(seen, places, rows, columns, smooth, by_body, width, spread, surface, groups, many):
+    """Part the samples of pixels into up to `GROUPS` surfaces.
 
-    ``corner_of`` (pixels, 4) are the points at corners, in the row of the first pixel of those that share them; −1
-    where there is none yet. New points, from ``next_point`` on, have ``places``.
-
-    Returns
-    -------
-    int
-        How many points are new.
+    ``surface`` (`GROUPS`, 7) is room for body, normal and place of a surface. ``groups`` (p, n) are the surfaces of
+    samples, that of the first is 0; ``many`` (p,) how many there are, one more if too many. Pixels are ``width`` wide where their rays start and grow by ``spread`` a mm.
     """
-    height, width = lens.shape
-    new = 0
-    for i in range(pixels.shape[0]):
-        pixel = pixels[i]
-        y, x = pixel // width, pixel % width
-        for k in range(4):
-            right, down = _right_down(k)
-            owner, slot, found = pixel, k, False
-            for other in range(4):
-                b, a = y + down - 1 + other // 2, x + right - 1 + other % 2
-                if not found and 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
-                    owner, r, d, found = b * width + a, x + right - a, y + down - b, True
-                    slot = 3 - r if d == 1 else r
-            if corner_of[owner, slot] < 0:
-                corner_of[owner, slot] = next_point + new
-                places.pixel[new], places.x[new], places.y[new] = pixel, right * UNITS, down * UNITS
-                new += 1
-            corners[i, k] = corner_of[owner, slot]
-    return new
-
-
-@inline_kernel
-def _group(points, i, a, b, surfaces, step):
-    """To which of two points a third belongs: by surface if they are on two, else by colour."""
-    found = NEITHER
-    if surfaces and points.body[a] != points.body[b]:
-        found = FIRST if points.body[i] == points.body[a] else found
-        found = SECOND if points.body[i] == points.body[b] else found
-    elif points.body[i] == points.body[a] and surfaces:
-        one, other = _along(points, i, a), _along(points, i, b)
-        if max(one, other) >= SAME_WAY:
-            found = FIRST if one >= other else SECOND
-    elif points.body[i] == points.body[a]:
-        off, away = _apart(points, i, a), _apart(points, i, b)
-        if min(off, away) <= OWN * step:
-            found = FIRST if off <= away else SECOND
-    return found
+    count = places.shape[1]
+    for i in range(places.shape[0]):
+        found, too_many = 0, False
+        for j in range(count):
+            row = i * count + j
+            f, body, x, y, z, px, py, pz = seen.faces[row], -1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            reach = 0.0
+            if f >= 0:
+                at, u, v, reach = f * columns, float(seen.u[row]), float(seen.v[row]), float(seen.distances[row])
+                body = int(rows[at + BODY])
+                x, y, z = float(rows[at + FACE]), float(rows[at + FACE + 1]), float(rows[at + FACE + 2])
+                if smooth and (rows[at + NORMALS] != 0 or rows[at + NORMALS + 1] != 0 or rows[at + NORMALS + 2] != 0):
+                    w = 1.0 - u - v
+                    at += NORMALS
+                    x = w * rows[at] + u * rows[at + 3] + v * rows[at + 6]
+                    y = w * rows[at + 1] + u * rows[at + 4] + v * rows[at + 7]
+                    z = w * rows[at + 2] + u * rows[at + 5] + v * rows[at + 8]
+                    length = math.sqrt(x * x + y * y + z * z)
+                    x, y, z = x / length, y / length, z / length
+                px = seen.origins[row, 0] + reach * seen.directions[row, 0]
+                py = seen.origins[row, 1] + reach * seen.directions[row, 1]
+                pz = seen.origins[row, 2] + reach * seen.directions[row, 2]
+            mine, away = -1, BEHIND * (width + spread * reach)
+            for g in range(found):
+                if mine < 0 and int(surface[g, 0]) == body:
+                    nx, ny, nz = surface[g, 1], surface[g, 2], surface[g, 3]
+                    off = nx * (px - surface[g, 4]) + ny * (py - surface[g, 5]) + nz * (pz - surface[g, 6])
+                    if body < 0 or by_body or (nx * x + ny * y + nz * z >= SAME_WAY and abs(off) <= away):
+                        mine = g
+            if mine < 0:
+                if found == GROUPS:
+                    too_many, mine = True, GROUPS - 1
+                else:
+                    mine = found
+                    surface[mine, 0], surface[mine, 1], surface[mine, 2], surface[mine, 3] = body, x, y, z
+                    surface[mine, 4], surface[mine, 5], surface[mine, 6] = px, py, pz
+                    found += 1
+            groups[i, j] = mine
+        many[i] = found + too_many
 
 
 @kernel
-def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wanted):
-    """Decide what becomes of each cell; ``sums`` are the light of those done.
+def pick(places, groups, many, known, picks):
+    """Choose samples (p, `GROUPS`, `PICKS`) of surfaces that are not yet ``known``, as far apart as may be; −1 if none.
 
-    ``groups`` are the corners, as bits, in the second group of a cell to cut. ``steps`` are those of cells not done.
-    Pixels beyond a side that an edge crosses are ``wanted``.
+    The first is that in the middle of the surface; of the first surface it is the pixel's centre, sample 0.
     """
-    height, width = lens.shape
-    q, light = points.code, points.light
-    for i in range(pixels.shape[0]):
-        pixel, k = pixels[i], corners[i]
-        p0, p1, p2, p3 = k[0], k[1], k[2], k[3]
-        surfaces = _one_surface(points, p1, p0) and _one_surface(points, p2, p0) and _one_surface(points, p3, p0)
-        surfaces &= _one_surface(points, pixel, p0)
-        most, wrong = np.float32(0), np.float32(0)
-        for c in range(3):
-            low = min(min(q[p0, c], q[p1, c]), min(min(q[p2, c], q[p3, c]), q[pixel, c]))
-            high = max(max(q[p0, c], q[p1, c]), max(max(q[p2, c], q[p3, c]), q[pixel, c]))
-            most = max(most, high - low)
-            mean = np.float32(0.25) * (q[p0, c] + q[p1, c] + q[p2, c] + q[p3, c])
-            saddle = np.float32(0.5) * abs(q[p0, c] + q[p2, c] - q[p1, c] - q[p3, c])
-            wrong = max(wrong, max(saddle, 2 * abs(q[pixel, c] - mean)))
-        if (wrong if surfaces else most) * MISSED <= error:
-            verdict[i] = DONE
-            for c in range(3):  # exact to the second order
-                mean = 0.25 * (float(light[p0, c]) + float(light[p1, c]) + float(light[p2, c]) + float(light[p3, c]))
-                sums[pixel, c] = (mean + 2.0 * light[pixel, c]) / 3.0
-            continue
-        first, second = p0, p0
-        if surfaces:  # the two colours farthest apart
-            far = np.float32(0)
-            for a in range(4):
-                for b in range(a + 1):
-                    other = k[b] if b < a else pixel
-                    step = _apart(points, k[a], other)
-                    if step > far:
-                        far, first, second = step, k[a], other
-        else:
-            for a in range(4):
-                other = k[a + 1] if a < 3 else pixel
-                if second == p0 and not _one_surface(points, other, p0):
-                    second = other
-        bits, good = 0, True
-        for a in range(4):
-            group = _group(points, k[a], first, second, not surfaces, most)
-            good &= group != NEITHER
-            bits |= (1 << a) if group == SECOND else 0
-        centre = _group(points, pixel, first, second, not surfaces, most)
-        good &= centre != NEITHER
-        for a in range(4):
-            for b in range(a + 1):
-                alike = (bits >> a & 1) == ((bits >> b & 1) if b < a else centre)
-                if alike and _apart(points, k[a], k[b] if b < a else pixel) * MISSED > WITHIN * error:
-                    good = False
-        one_edge = bits != 0 and bits != 5 and bits != 10 and bits != 15
-        verdict[i], groups[i], steps[i] = CUT if good and one_edge else OPEN, bits, most
-        y, x = pixel // width, pixel % width
-        for side in range(4):
-            b, a = y + (side == 2) - (side == 0), x + (side == 1) - (side == 3)
-            beside = 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]
-            if beside and _apart(points, k[side], k[(side + 1) % 4]) * MISSED > error:
-                wanted[b * width + a] = True
+    for i in range(places.shape[0]):
+        for g in range(GROUPS):
+            for k in range(PICKS):
+                picks[i, g, k] = -1
+        for g in range(known[i], min(many[i], GROUPS)):
+            x, y, count = 0.0, 0.0, 0
+            for j in range(places.shape[1]):
+                if groups[i, j] == g:
+                    x, y, count = x + places[i, j, 0], y + places[i, j, 1], count + 1
+            x, y = x / count, y / count
+            for k in range(min(PICKS, count)):
+                best, most = -1, -1.0
+                for j in range(places.shape[1]):
+                    if groups[i, j] == g:
+                        if k == 0:
+                            far = 4.0 - _square(places, i, j, x, y) + (4.0 if g == 0 and j == 0 else 0.0)
+                        else:
+                            far = math.inf
+                            for before in range(k):
+                                other = picks[i, g, before]
+                                far = min(far, _square(places, i, j, places[i, other, 0], places[i, other, 1]))
+                        if far > most:
+                            best, most = j, far
+                picks[i, g, k] = best
 
 
 @inline_kernel
-def _differs(points, i, j, error):
-    return points.body[i] != points.body[j] and _apart(points, i, j) * MISSED > error
+def _square(places, i, j, x, y):
+    dx, dy = places[i, j, 0] - x, places[i, j, 1] - y
+    return dx * dx + dy * dy
 
 
 @kernel
-def find_thin(pixels, corners, points, error, lens, thin):
-    """Mark pixels around places of a body that no place beside them has: centres among corners, and the other way."""
-    height, width = lens.shape
-    for i in range(pixels.shape[0]):
-        y, x = pixels[i] // width, pixels[i] % width
-        alone = True
-        for k in range(4):
-            right, down = _right_down(k)
-            alone &= _differs(points, pixels[i], corners[i, k], error)
-            corner_alone = True
-            for around in range(4):
-                b, a = y + down - 1 + around // 2, x + right - 1 + around % 2
-                if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
-                    corner_alone &= _differs(points, corners[i, k], b * width + a, error)
-            if corner_alone:
-                _mark(lens, y + down - 1, y + down, x + right - 1, x + right, lens[y, x], thin)
-        if alone:
-            _mark(lens, y - 1, y + 1, x - 1, x + 1, lens[y, x], thin)
-
-
-@inline_kernel
-def _mark(lens, top, bottom, left, right, of, out):
-    height, width = lens.shape
-    for b in range(max(top, 0), min(bottom + 1, height)):
-        for a in range(max(left, 0), min(right + 1, width)):
-            if lens[b, a] == of:
-                out[b * width + a] = True
-
-
-@kernel
-def follow(pixels, codes, points, error, lens, wanted):
-    """Mark the pixels around those whose mean is not the light of their centre."""
-    width = lens.shape[1]
-    for i in range(pixels.shape[0]):
-        apart, y, x = np.float32(0), pixels[i] // width, pixels[i] % width
-        for c in range(3):
-            apart = max(apart, abs(codes[i, c] - points.code[pixels[i], c]))
-        if apart > error:
-            _mark(lens, y - 1, y + 1, x - 1, x + 1, lens[y, x], wanted)
-
-
-@kernel
-def gather_sides(pixels, corners, groups, lens, side_of, sides, of_cell):
-    """Note the sides of cells that pass from one group to the other, each once; ``of_cell`` are those of each cell.
-
-    ``side_of`` (pixels, 4) is −1 everywhere.
-
-    Returns
-    -------
-    int
-        How many there are.
-    """
-    width = lens.shape[1]
-    made = 0
-    for i in range(pixels.shape[0]):
-        pixel = pixels[i]
-        y, x = pixel // width, pixel % width
-        for side in range(4):
-            after = (side + 1) % 4
-            of_cell[i, side] = -1
-            if (groups[i] >> side & 1) == (groups[i] >> after & 1):
-                continue
-            owner, slot = pixel, side
-            if side == 0 and y > 0 and lens[y - 1, x] == lens[y, x]:
-                owner, slot = pixel - width, 2
-            elif side == 3 and x > 0 and lens[y, x - 1] == lens[y, x]:
-                owner, slot = pixel - 1, 1
-            if side_of[owner, slot] < 0:
-                side_of[owner, slot] = made
-                sides.pixel[made], sides.side[made] = pixel, side
-                sides.ends[made, 0] = corners[i, side if side < 2 else after]
-                sides.ends[made, 1] = corners[i, after if side < 2 else side]
-                sides.low[made], sides.high[made], sides.bad[made] = 0, UNITS, False
-                made += 1
-            of_cell[i, side] = side_of[owner, slot]
-    return made
-
-
-@kernel
-def probe_sides(sides, points, error, bodies, which, places):
-    """Places halfway along what is left of those sides whose crossing is not yet known well enough.
-
-    Returns
-    -------
-    seen, shaded : int
-        How many there are; ``which`` are their sides. For those in front the body alone tells, if ``bodies``; the
-        others stand at the back.
-    """
-    front, back = 0, sides.pixel.shape[0]
-    for i in range(sides.pixel.shape[0]):
-        left = sides.high[i] - sides.low[i]
-        one, other = sides.ends[i, 0], sides.ends[i, 1]
-        # two crossings, each anywhere in what is left: a standard error of 0.2 of it
-        if sides.bad[i] or left <= 1 or 0.2 / UNITS * left * _apart(points, one, other) <= 0.6 * error:
-            continue
-        row = back - 1
-        if bodies and points.body[one] != points.body[other]:
-            row = front
-            front += 1
-        else:
-            back -= 1
-        which[row], places.pixel[row] = i, sides.pixel[i]
-        at, side = (sides.low[i] + sides.high[i]) // 2, sides.side[i]
-        places.x[row] = at if side == 0 or side == 2 else (UNITS if side == 1 else 0)
-        places.y[row] = at if side == 1 or side == 3 else (UNITS if side == 2 else 0)
-    return front, sides.pixel.shape[0] - back
-
-
-@kernel
-def narrow_sides(sides, which, first, points):
-    """Take what the places of `probe_sides` show, points from ``first`` on, to their sides."""
+def take_light(which, group, light, code, total, codes, low, high, count):
+    """Add light and codes of picked samples to their surfaces (p, `GROUPS`, 3), and note the span of the codes."""
     for j in range(which.shape[0]):
-        i = which[j]
-        one, other = sides.ends[i, 0], sides.ends[i, 1]
-        step = _apart(points, one, other)
-        group = _group(points, first + j, one, other, not _one_surface(points, one, other), step)
-        at = (sides.low[i] + sides.high[i]) // 2
-        if group == FIRST:
-            sides.low[i] = at
-        elif group == SECOND:
-            sides.high[i] = at
-        else:
-            sides.bad[i] = True
+        i, g = which[j], group[j]
+        n = count[i, g]
+        for c in range(3):
+            total[i, g, c] = (total[i, g, c] * n + light[j, c]) / (n + 1)
+            codes[i, g, c] = (codes[i, g, c] * n + code[j, c]) / (n + 1)
+            low[i, g, c] = min(low[i, g, c], code[j, c]) if n > 0 else code[j, c]
+            high[i, g, c] = max(high[i, g, c], code[j, c]) if n > 0 else code[j, c]
+        count[i, g] = n + 1
 
 
 @inline_kernel
-def _ends_of_groups(points, corners, i, bits):
-    """A corner of each group, and the largest step between corners."""
-    first, second, step = corners[i, 0], corners[i, 0], np.float32(0)
-    for a in range(4):
-        if (bits >> a & 1) == 0:
-            first = corners[i, a]
-        else:
-            second = corners[i, a]
-        for b in range(a):
-            step = max(step, _apart(points, corners[i, a], corners[i, b]))
-    return first, second, step
+def _below(nx, ny, t):
+    """Share of the unit square around 0 in which nx·x + ny·y < t."""
+    a, b = max(abs(nx), abs(ny)), min(abs(nx), abs(ny))
+    s, half, flat = abs(t), (a + b) / 2.0, (a - b) / 2.0
+    rest = max(half - s, 0.0)
+    more = s / a if s <= flat else 0.5 - rest * rest / (2.0 * a * max(b, 1e-12))
+    return 0.5 + (more if t > 0.0 else -more)
 
 
 @kernel
-def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shares, places):
-    """Cut cells by the chord between the crossings of their sides; two places beside its middle are to be looked at.
+def fit(places, groups, many, weights, turn, room, shares, errors, strip):
+    """Find the shares of surfaces (p, `GROUPS`) in pixels and their standard error, from places of samples.
 
-    ``shares`` are the parts of the first groups. A cell is `OPEN` if a side is bad, or its centre is on the other
-    side than its group.
+    Two surfaces that a straight line parts share the pixel by the mean of all lines that do; any others by the
+    ``weights`` (p, n) of their samples. Of lines, ``turn`` (p, 2) are the middle of their angles and how far they
+    go, before and afterwards, and ``strip`` (p, 6) is what all lines are in, see `strips`: half its thickness is 0
+    where none is. ``room`` (4, `ANGLES`) is for sums of the lines of one angle.
     """
-    for i in range(pixels.shape[0]):
-        bits = groups[i]
-        ax, ay, bx, by, met, bad = 0.0, 0.0, 0.0, 0.0, 0, False
-        twice, x0, y0, lastx, lasty, begun = 0.0, 0.0, 0.0, 0.0, 0.0, False
-        for turn in range(8):  # corners of the first group and crossings, around: twice the area between them
-            side = turn // 2
-            right, down = _right_down(side)
-            px, py, counts = float(right), float(down), (bits >> side & 1) == 0
-            if turn % 2:
-                s = of_cell[i, side]
-                counts = s >= 0
-                if counts:
-                    bad |= sides.bad[s]
-                    t = (sides.low[s] + sides.high[s]) / (2.0 * UNITS)
-                    px, py = (t if side == 0 or side == 2 else px), (t if side == 1 or side == 3 else py)
-                    ax, ay = (px, py) if met == 0 else (ax, ay)
-                    bx, by = (px, py) if met == 1 else (bx, by)
-                    met += 1
-            if counts:
-                if begun:
-                    twice += lastx * py - px * lasty
+    count = places.shape[1]
+    for i in range(places.shape[0]):
+        for g in range(GROUPS):
+            shares[i, g] = 0.0
+        for j in range(count):
+            shares[i, groups[i, j]] += weights[i, j]
+        strip[i, 5] = 0.0
+        missed = 0.0
+        for g in range(GROUPS):
+            missed = max(missed, 4.0 * shares[i, g] * (1.0 - shares[i, g]))
+        errors[i] = OF_COUNTS * count ** -0.75 if many[i] > 1 else 0.0
+        if many[i] != 2:
+            continue
+        middle, wide = turn[i, 0], turn[i, 1]
+        total, mean, square, best, most = 0.0, 0.0, 0.0, -1, 0.0
+        for k in range(ANGLES):
+            angle = middle + wide * ((2 * k + 1.0) / ANGLES - 1.0)
+            nx, ny = math.cos(angle), math.sin(angle)
+            low0, high0, low1, high1 = math.inf, -math.inf, math.inf, -math.inf
+            for j in range(count):
+                along = nx * (places[i, j, 0] - 0.5) + ny * (places[i, j, 1] - 0.5)
+                if groups[i, j] == 0:
+                    low0, high0 = min(low0, along), max(high0, along)
                 else:
-                    x0, y0, begun = px, py, True
-                lastx, lasty = px, py
-        shares[i] = abs(twice + lastx * y0 - x0 * lasty) / 2.0
-        first, second, step = _ends_of_groups(points, corners, i, bits)
-        mx, my = (ax + bx) / 2.0, (ay + by) / 2.0
-        length = max(math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay)), 1e-9)
-        nx, ny = (by - ay) / length, (ax - bx) / length
-        far0, far1 = 0.0, 0.0  # across the chord, to the farthest corner of either group
-        for a in range(4):
-            right, down = _right_down(a)
-            across = (right - mx) * nx + (down - my) * ny
-            if (bits >> a & 1) == 0:
-                far0 = across if abs(across) > abs(far0) else far0
-            else:
-                far1 = across if abs(across) > abs(far1) else far1
-        away = min(max(2.0 * error / max(float(step), 1.0), LEAST_AWAY), 0.2)
-        for k in range(2):
-            far = far0 if k == 0 else far1
-            off = min(away, 0.6 * abs(far)) * (1.0 if far >= 0.0 else -1.0)
-            places.pixel[2 * i + k] = pixels[i]
-            places.x[2 * i + k] = UNITS * min(max(mx + off * nx, 0.0), 1.0)
-            places.y[2 * i + k] = UNITS * min(max(my + off * ny, 0.0), 1.0)
-        across = (0.5 - mx) * nx + (0.5 - my) * ny
-        if abs(across) > away:
-            surfaces = not _one_surface(points, first, second)
-            expected = FIRST if (across > 0.0) == (far0 > 0.0) else SECOND
-            bad |= _group(points, pixels[i], first, second, surfaces, step) != expected
-        verdict[i] = OPEN if bad else CUT
+                    low1, high1 = min(low1, along), max(high1, along)
+            half = (abs(nx) + abs(ny)) / 2.0
+            turned = low0 >= high1
+            low, high = (high1, low0) if turned else (high0, low1)
+            low, high = max(low, -half), min(high, half)
+            room[0, k], room[1, k], room[2, k], room[3, k] = nx, ny, low, high
+            weight = high - low
+            if weight > 0.0:
+                share = _below(nx, ny, (low + high) / 2.0)
+                share = 1.0 - share if turned else share
+                total, mean = total + weight, mean + weight * share
+                square += weight * (share * share + weight * weight / 12.0)
+                if weight > most:
+                    best, most = k, weight
+        if best < 0:
+            continue
+        mean /= total
+        shares[i, 0], shares[i, 1] = mean, 1.0 - mean
+        errors[i] = math.sqrt(max(square / total - mean * mean, 0.0))
+        _around(room, best, strip[i])
+        farthest = 0.5
+        for k in range(ANGLES):
+            if room[3, k] > room[2, k]:
+                farthest = max(farthest, abs(k - best) + 1.0)
+        turn[i, 0] = middle + wide * ((2 * best + 1.0) / ANGLES - 1.0)
+        turn[i, 1] = min(wide * 2.0 * farthest / ANGLES, wide)
+
+
+@inline_kernel
+def _around(room, best, strip):
+    """The strip around all lines of `fit`, along that of the best angle."""
+    nx, ny = room[0, best], room[1, best]
+    t = (room[2, best] + room[3, best]) / 2.0
+    swap = abs(nx) > abs(ny)
+    a, b = (ny, nx) if swap else (nx, ny)
+    slope, height, away = -a / b, t / b, 0.0
+    for k in range(ANGLES):
+        if room[3, k] > room[2, k]:
+            p, q = (room[1, k], room[0, k]) if swap else (room[0, k], room[1, k])
+            q = q if abs(q) > 1e-3 else 1e-3
+            for end in range(4):
+                along, t = (0.5 if end % 2 else -0.5), room[2 + end // 2, k]
+                away = max(away, abs((t - p * along) / q - height - slope * along))
+    strip[0], strip[1], strip[2] = 1.0 if swap else 0.0, 0.0, 1.0
+    strip[3], strip[4], strip[5] = height + 0.5 - 0.5 * slope, slope, min(away, 1.0) + THINNEST
 
 
 @kernel
-def confirm(pixels, corners, groups, shares, beside, points, error, verdict, sums):
-    """Find the light of cells cut; `OPEN` those at whose places of `chords` points, from ``beside`` on, disagree."""
-    light = points.light
+def into_strips(strip, places, old, weights):
+    """Move new places (p, m, 2), the last of ``weights`` (p, n), into strips; before them stand ``old`` (p, n − m, 2).
+
+    Those that stand beside the strip have what it leaves of the pixel.
+    """
+    first, count = old.shape[1], places.shape[1]
+    for i in range(places.shape[0]):
+        axis, area, outside = int(strip[i, 0]), 0.0, 0
+        for j in range(count):
+            along = places[i, j, axis]
+            low, high = _across(strip[i], along)
+            weights[i, first + j] = (high - low) / count
+            area += weights[i, first + j]
+            places[i, j, 1 - axis] = low + (high - low) * places[i, j, 1 - axis]
+        for j in range(first):
+            low, high = _across(strip[i], old[i, j, axis])
+            beside = not (low <= old[i, j, 1 - axis] <= high)
+            weights[i, j] = 1.0 if beside else 0.0
+            outside += beside
+        for j in range(first + count):
+            if j < first:
+                weights[i, j] *= (1.0 - area) / max(outside, 1)
+            elif outside == 0:
+                weights[i, j] /= max(area, 1e-12)
+
+
+@inline_kernel
+def _step(codes, i, a, b):
+    c = codes
+    return max(abs(c[i, a, 0] - c[i, b, 0]), max(abs(c[i, a, 1] - c[i, b, 1]), abs(c[i, a, 2] - c[i, b, 2])))
+
+
+@kernel
+def contrast(many, codes, errors):
+    """Turn errors of shares into errors of codes (p, `GROUPS`, 3), by the largest step between surfaces."""
+    for i in range(many.shape[0]):
+        most = np.float32(0)
+        for a in range(1, min(many[i], GROUPS)):
+            for b in range(a):
+                most = max(most, _step(codes, i, a, b))
+        errors[i] *= most
+
+
+@kernel
+def mix(pixels, places, groups, many, bodies, shares, light, codes, low, high, points, error, lens, sums, verdict, wanted):
+    """Mix the light (p, `GROUPS`, 3) of surfaces by their shares.
+
+    A pixel stays `OPEN` with too many surfaces, or if the codes of one's samples go from ``low`` to ``high`` values
+    that are too far apart. Pixels are ``wanted`` beside which a surface is seen that their centres do not show.
+    """
+    height, width = lens.shape
     for i in range(pixels.shape[0]):
-        bits, one, other = groups[i], beside + 2 * i, beside + 2 * i + 1
-        first, second, step = _ends_of_groups(points, corners, i, bits)
-        surfaces = not _one_surface(points, first, second)
-        good = _group(points, one, first, second, surfaces, step) == FIRST
-        good &= _group(points, other, first, second, surfaces, step) == SECOND
-        good &= _apart(points, one, first) * MISSED * shares[i] <= WITHIN * error
-        good &= _apart(points, other, second) * MISSED * (1.0 - shares[i]) <= WITHIN * error
-        if not good:
-            verdict[i] = OPEN
-            continue
+        pixel = pixels[i]
+        y, x = pixel // width, pixel % width
+        good = many[i] <= GROUPS
+        for g in range(min(many[i], GROUPS)):
+            span = np.float32(0)
+            for c in range(3):
+                span = max(span, high[i, g, c] - low[i, g, c])
+            good &= span * MISSED * shares[i, g] <= UNLIKE * error
+        verdict[i] = DONE if good else OPEN
         for c in range(3):
-            mine, others, many = 0.0, 0.0, 0
-            for a in range(4):
-                if (bits >> a & 1) == 0:
-                    mine, many = mine + light[corners[i, a], c], many + 1
-                else:
-                    others += light[corners[i, a], c]
-            mine, others = 0.5 * (mine / many + light[one, c]), 0.5 * (others / (4 - many) + light[other, c])
-            sums[pixels[i], c] = shares[i] * mine + (1.0 - shares[i]) * others
+            total = 0.0
+            for g in range(min(many[i], GROUPS)):
+                total += shares[i, g] * light[i, g, c]
+            sums[pixel, c] = total
+        for j in range(places.shape[1]):
+            g = groups[i, j]
+            for side in range(4):
+                b, a = y + (side == 2) - (side == 0), x + (side == 1) - (side == 3)
+                if not (0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]):
+                    continue
+                place = places[i, j, 0 if side % 2 else 1]
+                near = place < BESIDE if side == 0 or side == 3 else place > 1.0 - BESIDE
+                q = b * width + a
+                if near and points.body[q] != bodies[i, g]:
+                    step = np.float32(0)
+                    for c in range(3):
+                        step = max(step, abs(points.code[q, c] - codes[i, g, c]))
+                    if step * MISSED > error:
+                        wanted[q] = True
