@@ -6,16 +6,15 @@ the lines that part them. Where small bodies may be, it gets `SAMPLES`. Rays pas
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .edges import FOLLOWED, Cells, Look, Sight
+from .edges import FOLLOWED, Cells, Sight
 from .kernels import cells as kernels
-from .kernels.cells import DONE, GROUPS, UNITS, Places, Points
+from .kernels.cells import OPEN, UNITS, Places, Points
 from .sampling import Edges, fixed_sum
 from .support_images import NAMES, name_hashes
 from .tracer import Support
@@ -33,7 +32,6 @@ class Coverage(Cells):
     """Pixels of bodies: each has a light of its own."""
 
     by_body = True
-    found: list[Shares] = field(init=False, default_factory=list)
 
     def _trace(self, places: Places, points: Points, bodies: bool, finer: float) -> None:
         self.sight.check()
@@ -53,21 +51,6 @@ class Coverage(Cells):
         assert seen.object_id is not None
         return seen.object_id
 
-    def _lights(self, look: Look, picks: NDArray[np.int32], centres: Whole) -> Iterator[tuple[Any, ...]]:
-        first = picks[:, :, 0].copy()
-        first[centres, 0] = 0
-        which, group = np.nonzero(first >= 0)
-        faces = look.seen.faces[which * look.places.shape[1] + first[which, group]]
-        bodies = np.where(faces >= 0, self.sight.tracer.scene.object_of_face[faces], -1).astype(np.int32)
-        look.bodies[which, group] = bodies
-        light = np.zeros((len(which), 3), np.float32)
-        light[:, 0] = (bodies + 1) * LIGHT
-        yield which, group, light, (light * APART).astype(np.float32)
-
-    def _mixed(self, look: Look, shares: NDArray[np.float64], verdict: NDArray[np.int8]) -> None:
-        which, group = np.nonzero((shares > 0) & (verdict == DONE)[:, None])
-        self.found.append((look.pixels[which], look.bodies[which, group].astype(np.int64), shares[which, group]))
-
     def shares(self, pixels: Whole) -> list[Shares]:
         """Return the shares of pixels."""
         half, many = np.full(len(pixels), UNITS / 2, np.float32), self.lens.size
@@ -76,19 +59,29 @@ class Coverage(Cells):
         steps, opened = np.zeros(many, np.float32), np.zeros(many, np.bool_)
         kernels.doubtful(self.points, self.lens, self.own, self.wanted.error, steps, np.empty(many, np.bool_))
         self._look_beyond(steps, steps)
-        doubtful, left = steps > 0, [pixels[:0]]
-        if len(self.sight.rods):
-            left.append(pixels[self._touched(pixels)[0]])
-            opened[left[-1]] = True
+        strips = self._strips_of(pixels)
+        doubtful, left, found = (steps > 0) | (strips[:, 5] != 0), [pixels[:0]], []
         for _ in range(FOLLOWED):
             some = np.flatnonzero(doubtful & ~opened)
             if not len(some):
                 break
             opened[some] = True
-            left.append(self._part_pixels(some, steps, doubtful) if self._parts_pixels() else some)
+            if not self._looks():
+                left.append(some)
+                continue
+            told = self._looked(some, np.full(len(some), APART * LIGHT, np.float32), strips[some])
+            codes = ((told.bodies + 1) * LIGHT * APART).astype(np.float32)[:, :, None].repeat(3, axis=2)
+            verdict = np.empty(len(some), np.int8)
+            kernels.mix(
+                some, told, codes, codes, codes, codes, self.points, self.wanted.error, self.lens, self.sums, verdict,
+                doubtful,
+            )  # fmt: skip
+            left.append(some[verdict == OPEN])
+            which, group = np.nonzero((told.shares > 0) & (verdict != OPEN)[:, None])
+            found.append((some[which], told.bodies[which, group].astype(np.int64), told.shares[which, group]))
         whole = pixels[~opened[pixels]]
         alone = whole, self.points.body[whole].astype(np.int64), np.ones(len(whole))
-        return [alone, *self.found, self._sampled(np.concatenate(left))]
+        return [alone, *found, self._sampled(np.concatenate(left))]
 
     def _sampled(self, pixels: Whole) -> Shares:
         s, counted = self.sight, [np.empty(0, np.int64)]

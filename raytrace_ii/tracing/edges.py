@@ -15,8 +15,7 @@ more where the picture is rougher. What the filter of textures errs alike in all
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -27,11 +26,12 @@ from ii_core import IICamera
 from ..scene.scene import Scene
 from .intersect import Hits
 from .kernels import cells as kernels
-from .kernels.cells import ANGLES, DONE, GROUPS, MISSED, OPEN, PICKS, UNITS, Places, Points, Seen
+from .kernels import looks
+from .kernels.cells import DONE, MISSED, OPEN, UNITS, Places, Points
+from .kernels.looks import GROUPS, PICKS, Asked, Told
 from .kernels.sampling import lobe_keys
 from .kernels.sampling import places as set_places
 from .sample_places import fixed_places
-from .kernels.tables import ALL_COLUMNS
 from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
 
@@ -46,9 +46,9 @@ PILOTS, OF_PILOTS = 768, (4, 9)  # pixels of a tile that get two sets, which tel
 PILOTS_FILTER = 0.6  # times the width of a set's filter: what that errs alike in all sets scatters
 ALIKE = 0.8  # square of the difference of both in parts of the sum of the squares of their errors
 EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per roughness; powers of n by which it falls
-FIRST, FIRST_MISS = (4, 8, 16), np.array([0.088, 0.052, 0.031])  # places looked at first, and by what they miss
 TAU = 1.5  # how much more than the error wanted surfaces may cause in one pixel
-LOOKS, IN_LINE, SPLIT = 4, 16, 16384  # most looks at a pixel, places around a line, rays at a time
+MOST_PICKS = GROUPS * PICKS
+HASH = np.uint64(0x9E3779B97F4A7C15)
 OF_PART = 0.7  # width of a surface's part of a pixel
 TO_SIDES = np.array([(0.5, 0.5), (1.0, 0.5), (0.5, 1.0)])  # places between whose rays all others are
 FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
@@ -56,12 +56,10 @@ FOLLOWED = 64  # how far a thin body is followed, in pixels
 WHITE = 255.0  # code
 SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 5 ns a pixel each
 THIN = 0.75  # pixels across a body, wider ones cover centres and corners all along
-OF_SMALL = 16, 64  # least and most samples where a small or thin body may be
-IN_STRIP, OF_STRIP = 2, (4, 64)  # how much fewer in a strip around it, which has little of the pixel
-SHIFTS = 0.7549, 0.5698  # multiples of them share a square out evenly
+OF_SMALL = 32  # least samples where a small or thin body may be in a tile of fine structure
 OF_ROD = 500  # vertices that tell the longest axis of a body
 FINEST = 4096  # places in a pixel along each side that have keys of their own
-RECORDED = frozenset({"object_id", "shading_normal"})  # what centres have to record
+RECORDED = frozenset({"object_id", "shading_normal", "ray_length"})  # what centres have to record
 
 Floats = NDArray[np.float64]
 Radiance = NDArray[np.float32]
@@ -88,37 +86,6 @@ class Sight:
     check: Callable[[], None]
 
 
-@dataclass(frozen=True)
-class Look:
-    """Places (p, n, 2) of pixels, their weights, what is `Seen` there, and rays (p, 3, 3) as of `kernels.aim`.
-
-    ``light`` (p, `GROUPS`, 3), ``codes``, their least and greatest and ``bodies`` are those of the first surfaces, as
-    many as are ``known``, from samples that ``count`` counts; ``turn`` is that of `kernels.fit`.
-    """
-
-    pixels: NDArray[np.int64]
-    L: Floats
-    D: Floats
-    places: Floats
-    weights: Floats
-    seen: Seen
-    light: Radiance
-    codes: Radiance
-    low: Radiance
-    high: Radiance
-    bodies: Whole
-    count: Whole
-    known: NDArray[np.int64]
-    turn: Floats
-
-    def of(self, which: NDArray[np.bool_]) -> Look:
-        """Return the rows of some of the pixels."""
-        count, rows = self.places.shape[1], np.flatnonzero(which)
-        samples = (rows[:, None] * count + np.arange(count)).reshape(-1)
-        fields = {name: value[rows] for name, value in vars(self).items() if name != "seen"}
-        return Look(**fields, seen=_part(self.seen, samples))
-
-
 @dataclass
 class Cells:
     """Pixels of a tile and its rim in rows: columns and rows in the picture, lenses, and what is seen of them.
@@ -138,6 +105,7 @@ class Cells:
     rays: Whole = field(init=False)
     sums: Floats = field(init=False)
     verdicts: NDArray[np.int8] = field(init=False)
+    reach: Radiance = field(init=False)
     squares: float = field(init=False, default=0.0)
     _count: int = field(init=False)
 
@@ -148,7 +116,7 @@ class Cells:
             np.zeros((n, 3), np.float32),
         )  # fmt: skip
         self.rays, self.sums = np.ones(n, np.int32), np.zeros((n, 3))
-        self.verdicts = np.full(n, -1, np.int8)
+        self.verdicts, self.reach = np.full(n, -1, np.int8), np.full(n, np.nan, np.float32)
 
     def look_around(self, centres: Places, finer: float = 1.0) -> None:
         """Look at centres of pixels, of the rim as a rule."""
@@ -169,167 +137,87 @@ class Cells:
         kernels.roughness(self.points, self.lens, np.empty((many, 2), np.float32), rough)
         self._look_beyond(steps, rough)
         doubtful = steps > 0
-        if len(self.sight.rods):
-            opened[self._small(inside)] = True
-        if not self._parts_pixels():
-            uneven = doubtful
-        left = [np.flatnonzero(uneven & doubtful & ~opened)]
+        strips = self._strips_of(inside)
+        if not self._looks():
+            uneven = doubtful | (strips[:, 5] != 0)
+        left = [np.flatnonzero(uneven & (doubtful | (strips[:, 5] != 0)) & self.own)]
         opened[left[0]] = True
+        doubtful |= (strips[:, 5] != 0) & self.own
         for _ in range(FOLLOWED):
             pixels = np.flatnonzero(doubtful & ~opened & self.own)
             if not len(pixels):
                 break
             opened[pixels] = True
-            left.append(self._part_pixels(pixels, steps, doubtful))
+            left.append(self._look_at(pixels, steps[pixels], strips[pixels], doubtful))
         self._share_out(np.concatenate(left), rough)
         return opened
 
-    def _parts_pixels(self) -> bool:
+    def _strips_of(self, inside: NDArray[np.int64]) -> Floats:
+        """Return strips of small bodies in all pixels, see `kernels.strips`; half their thickness is 0 in most."""
+        strips = np.zeros((self.lens.size, 6))
+        if len(self.sight.rods):
+            which, strip = self._touched(inside)
+            strips[inside[which]] = strip
+        return strips
+
+    def _looks(self) -> bool:
         """Return whether visibility alone parts pixels: no face is passed, and all rays carry the same light."""
         s = self.sight
-        return s.tracer.sees_bodies and s.camera.weighted_rays_at(0, 0)[2] is None
+        return s.tracer.looks and s.camera.weighted_rays_at(0, 0)[2] is None
 
-    def _part_pixels(
-        self, pixels: NDArray[np.int64], steps: NDArray[np.float32], doubtful: NDArray[np.bool_]
+    def _look_at(
+        self, pixels: NDArray[np.int64], step: NDArray[np.float32], strip: Floats, doubtful: NDArray[np.bool_]
     ) -> NDArray[np.int64]:
         """Find the light of pixels by the shares of the surfaces seen in them; return those that need samples."""
-        step, limit, left = steps[pixels], TAU * self.wanted.error, [pixels[:0]]
-        for number, (low, high) in zip(FIRST, pairwise((0.0, *(limit / FIRST_MISS[:-1]), np.inf)), strict=True):
-            some = pixels[(step > low) & (step <= high) | (step == 0) & (number == FIRST[-1])]
-            for start in range(0, len(some), SPLIT // number):
-                left += self._mix(self._first_look(some[start : start + SPLIT // number], number), limit, doubtful)
-        return np.concatenate(left)
-
-    def _mix(self, look: Look, limit: float, doubtful: NDArray[np.bool_]) -> Iterator[NDArray[np.int64]]:
-        """Yield those of the pixels looked at that need samples; find the light of the others."""
-        for stage in range(LOOKS):
-            groups, many = self._surfaces(look)
-            self._shade(look, groups, many)
-            count = len(look.pixels)
-            shares, errors, strip = np.empty((count, GROUPS)), np.empty(count), np.empty((count, 6))
-            kernels.fit(
-                look.places, groups, many, look.weights, look.turn, np.empty((4, ANGLES)), shares, errors, strip
-            )  # fmt: skip
-            kernels.contrast(many, look.codes, errors)
-            more = (errors > limit) & (many <= GROUPS) & (stage < LOOKS - 1)
-            done, verdict = look.of(~more), np.empty(np.count_nonzero(~more), np.int8)
-            kernels.mix(
-                done.pixels, done.places, groups[~more], many[~more], done.bodies, shares[~more], done.light,
-                done.codes, done.low, done.high, self.points, self.wanted.error, self.lens, self.sums, verdict, doubtful,
-            )  # fmt: skip
-            self.verdicts[done.pixels] = verdict
-            self._mixed(done, shares[~more], verdict)
-            self.squares += float(np.sum(errors[~more][verdict == DONE] ** 2))
-            yield done.pixels[verdict == OPEN]
-            straight = strip[:, 5] > 0
-            if (more & ~straight).any():
-                yield from self._mix(self._more(look.of(more & ~straight)), limit, doubtful)
-            if not (more & straight).any():
-                break
-            look = self._in_strips(look.of(more & straight), strip[more & straight])
-
-    def _mixed(self, look: Look, shares: Floats, verdict: NDArray[np.int8]) -> None:
-        """Note the shares of surfaces."""
-
-    def _first_look(self, pixels: NDArray[np.int64], number: int) -> Look:
-        """Look at the centres of pixels and at a set of places in them."""
-        count, s = len(pixels), self.sight
-        L, D, _ = s.camera.weighted_rays_at(self.m[pixels][:, None], self.n[pixels][:, None], TO_SIDES)
-        places, weights = np.full((count, number, 2), 0.5), np.full((count, number), 1 / (number - 1))
-        places[:, 1:] = self._set(pixels, number - 1, fixed_places(number - 1))
-        weights[:, 0] = 0
-        look = Look(
-            pixels, L, D, places, weights, self._see(pixels, L, D, places),
-            *(np.zeros((count, GROUPS, 3), np.float32) for _ in range(4)), np.full((count, GROUPS), -2, np.int32),
-            np.zeros((count, GROUPS), np.int32), np.zeros(count, np.int64), np.tile((np.pi / 2, np.pi / 2), (count, 1)),
+        told = self._looked(pixels, step, strip)
+        count = len(pixels)
+        light, codes, low, high = (np.zeros((count, GROUPS, 3), np.float32) for _ in range(4))
+        number = np.zeros((count, GROUPS), np.int32)
+        centres = np.arange(count), np.zeros(count, np.int64), self.points.light[pixels], self.points.code[pixels]
+        for some in (centres, *self._shaded(pixels, told)):
+            looks.take_light(*some, light, codes, low, high, number)
+        verdict = np.empty(count, np.int8)
+        self.squares += kernels.mix(
+            pixels, told, light, codes, low, high, self.points, self.wanted.error, self.lens, self.sums, verdict,
+            doubtful,
         )  # fmt: skip
-        look.bodies[:, 0] = self.points.body[pixels]
-        return look
+        self.verdicts[pixels] = verdict
+        return pixels[verdict == OPEN]
 
-    def _more(self, look: Look) -> Look:
-        """Look at three times as many places of pixels again."""
-        old = look.places.shape[1]
-        places = self._set(look.pixels, 3 * old, fixed_places(0))
-        parts = np.array([old, 3 * old]) ** 1.5
-        weights = np.concatenate([look.weights * parts[0] / parts.sum(), np.full(places.shape[:2], parts[1] / parts.sum() / (3 * old))], axis=1)
-        return self._joined(look, places, weights)
-
-    def _in_strips(self, look: Look, strip: Floats) -> Look:
-        """Look at places in strips of pixels, too."""
-        places = self._set(look.pixels, IN_LINE, fixed_places(IN_LINE))
-        weights = np.empty((len(places), look.places.shape[1] + IN_LINE))
-        kernels.into_strips(strip, places, look.places, weights)
-        return self._joined(look, places, weights)
-
-    def _joined(self, look: Look, places: Floats, weights: Floats) -> Look:
-        seen = self._see(look.pixels, look.L, look.D, places)
-        count = len(places)
-        both = [
-            np.concatenate([a.reshape(count, -1, *a.shape[1:]), b.reshape(count, -1, *b.shape[1:])], axis=1)
-            for a, b in zip(look.seen, seen, strict=True)
-        ]
-        arrays: list[Any] = [a.reshape(-1, *a.shape[2:]) for a in both]
-        return replace(look, places=np.concatenate([look.places, places], axis=1), weights=weights, seen=Seen(*arrays))
-
-    def _set(self, pixels: NDArray[np.int64], number: int, table: Floats) -> Floats:
-        out = np.empty((len(pixels) * number, 2))
-        set_places(self.sight.seed, self.m[pixels], self.n[pixels], self.sight.camera.pixels[0], 0, number, 0, table, out)
-        return out.reshape(-1, number, 2)
-
-    def _see(self, pixels: NDArray[np.int64], L: Floats, D: Floats, places: Floats) -> Seen:
-        """Return what is seen through places (p, n, 2) of pixels, by visibility alone."""
-        s, rays = self.sight, places.shape[0] * places.shape[1]
+    def _looked(self, pixels: NDArray[np.int64], step: NDArray[np.float32], strip: Floats) -> Told:
+        """Return what pixels show, as exactly as steps of colour need it; a step of 0 is not known."""
+        s, (turn, shift) = self.sight, (self.sight.tracer.pose[:3, :3], self.sight.tracer.pose[:3, 3])
         s.check()
-        origins, directions = np.empty((rays, 3), np.float32), np.empty((rays, 3), np.float32)
-        kernels.aim(L, D, places, s.tracer.pose[:3, :3], s.tracer.pose[:3, 3], origins, directions)
-        self.rays[pixels] += places.shape[1]
-        return Seen(origins, directions, *s.tracer.seen(origins, directions))
-
-    def _surfaces(self, look: Look) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-        """Return the surfaces of samples, and how many a pixel has."""
-        count, number = look.places.shape[:2]
-        groups, many = np.empty((count, number), np.uint8), np.empty(count, np.int64)
-        faces = self.sight.tracer.scene.surfaces
-        kernels.part(
-            look.seen, look.places, faces.rows, faces.columns, faces.columns == ALL_COLUMNS, self.by_body,
-            *self.sight.pixel, np.empty((GROUPS, 7)), groups, many,
+        L, D, _ = s.camera.weighted_rays_at(self.m[pixels][:, None], self.n[pixels][:, None], TO_SIDES)
+        error = TAU * self.wanted.error / np.where(step > 0, step, WHITE / 2).astype(np.float64)
+        number = (self.n[pixels] * s.camera.pixels[0] + self.m[pixels]).astype(np.uint64) + np.uint64(s.seed % 2**32 << 31)
+        told = s.tracer.look(
+            Asked(
+                L @ turn.T + shift, D @ turn.T, self.points.body[pixels], self.points.normal[pixels],
+                self.reach[pixels], np.ascontiguousarray(strip), error, number * HASH >> np.uint64(29),
+            ),
+            self.by_body, s.pixel,
         )  # fmt: skip
-        return groups, many
+        self.rays[pixels] += told.rays
+        return told
 
-    def _shade(self, look: Look, groups: NDArray[np.uint8], many: NDArray[np.int64]) -> None:
-        """Find the light of surfaces that have none yet, by samples of each."""
-        kernels.pick(look.places, groups, many, look.known, picks := np.empty((len(many), GROUPS, PICKS), np.int32))
-        centres = np.flatnonzero(look.known == 0)
-        picks[centres, 0, 0] = -1
-        look.known[:] = np.maximum(look.known, np.minimum(many, GROUPS))
-        for which, group, light, codes in self._lights(look, picks, centres):
-            kernels.take_light(
-                which, group, light, codes, look.light, look.codes, look.low, look.high, look.count
-            )  # fmt: skip
-
-    def _lights(self, look: Look, picks: Whole, centres: NDArray[np.int64]) -> Iterator[tuple[Any, Any, Radiance, Radiance]]:
-        """Yield rows of pixels, surfaces, light and codes of samples picked."""
-        pixels = look.pixels[centres]
-        yield centres, np.zeros_like(centres), self.points.light[pixels], self.points.code[pixels]
-        which, group, pick = np.nonzero(picks >= 0)
-        if not len(which):
-            return
-        at = which * look.places.shape[1] + picks[which, group, pick]
-        origins, directions, *found = (array[at] for array in look.seen)
-        hits = Hits(*found)
+    def _shaded(
+        self, pixels: NDArray[np.int64], told: Told
+    ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], Radiance, Radiance]]:
+        """Yield rows of pixels, surfaces, light and codes of the samples that are to be shaded."""
         s, tracer = self.sight, self.sight.tracer
-        keys = None
-        if tracer.scene.glossy:
-            place = (look.places.reshape(-1, 2)[at] * FINEST).astype(np.int64)
-            keys = np.empty(len(at), np.uint64)
-            m, n = self.m[look.pixels[which]], self.n[look.pixels[which]]
-            across, down = FINEST * m + place[:, 0], FINEST * n + place[:, 1]
-            lobe_keys(s.seed, across, down, FINEST * s.camera.pixels[0] + 1, 0, 1, keys)
         tracer.footprint, tracer.lobes = (s.width[0] * OF_PART, s.width[1] * OF_PART), (LOBE_RAYS, 1)
-        light = tracer.shade(origins, directions, hits, keys)
-        kernels.encode(light, self.curve, codes := np.empty_like(light))
-        look.bodies[which, group] = np.where(hits.faces >= 0, tracer.scene.object_of_face[hits.faces], -1)
-        yield which, group, light, codes
+        for start in range(0, len(told.which), s.batch):
+            some = slice(start, start + s.batch)
+            which, faces = told.which[some], told.faces[some]
+            keys = None
+            if tracer.scene.glossy:
+                keys = np.empty(len(which), np.uint64)
+                number = np.arange(len(which)) - np.searchsorted(which, which)
+                lobe_keys(s.seed, MOST_PICKS * self.m[pixels[which]] + number, self.n[pixels[which]], MOST_PICKS * s.camera.pixels[0], 0, 1, keys)
+            light = tracer.shade(told.origins[some], told.ways[some], Hits(faces, told.u[some], told.v[some], told.distances[some]), keys)
+            kernels.encode(light, self.curve, codes := np.empty_like(light))
+            yield which, told.group[some], light, codes
 
     def dense(self, some: NDArray[np.int64]) -> bool:
         """Tell by some of the pixels whether sets in all of them are worth more than looking for edges."""
@@ -354,9 +242,9 @@ class Cells:
         more = GOLDEN * np.arange(len(order)) % 1 < at % 1
         numbers = SETS[np.minimum(int(at) + more, len(SETS) - 1)]
         if len(self.sight.rods):
-            thin = np.zeros(self.lens.size, np.bool_)
-            thin[self._small(order)] = True
-            numbers, order = numbers[~thin[order]], order[~thin[order]]
+            small = order[self._touched(order)[0]]
+            thin = np.isin(order, small)
+            numbers[thin] = np.maximum(numbers[thin], OF_SMALL)
         self._sample(order, numbers)
 
     def _look_beyond(self, steps: NDArray[np.float32], rough: NDArray[np.float32]) -> None:
@@ -370,18 +258,6 @@ class Cells:
         self._count = first
         usual = np.median(rough[steps > 0]) if (steps > 0).any() else 0.0
         steps[other], rough[other] = WHITE, np.maximum(rough[other], usual)
-
-    def _small(self, inside: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Find the light of those pixels in which small bodies may be seen, and return them."""
-        which, strip = self._touched(inside)
-        pixels, narrow = inside[which], strip[:, 5] > 0
-        number = (MISSED * WHITE / 2 / self.wanted.error) ** (4 / 3)
-        whole = pixels[~narrow]
-        self._sample(whole, _numbers(np.full(len(whole), np.clip(number, *OF_SMALL))))
-        numbers = _numbers(np.full(int(np.count_nonzero(narrow)), np.clip(number / IN_STRIP, *OF_STRIP)))
-        for number in np.unique(numbers).tolist():
-            self._strips(pixels[narrow][numbers == number], strip[narrow][numbers == number], number)
-        return pixels
 
     def _touched(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
         """Return which pixels small bodies may be seen in, and strips (n, 6) that have them, see `kernels.strips`."""
@@ -400,28 +276,6 @@ class Cells:
         L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels], within)
         length = np.linalg.norm(D, axis=-1, keepdims=True)
         return L, np.divide(D, length, out=D, where=length > 0)
-
-    def _strips(self, pixels: NDArray[np.int64], strip: Floats, number: int) -> None:
-        """Find the light of pixels by as many samples in the strip of a small body as around it."""
-        s, count = self.sight, 2 * number
-        s.tracer.footprint = s.width[0] / number**0.5, s.width[1] / number**0.5
-        s.tracer.lobes = -(-LOBE_RAYS // count), count
-        self.rays[pixels] += count
-        for start in range(0, len(pixels), s.batch // count):
-            some = slice(start, start + s.batch // count)
-            m, n = self.m[pixels[some]], self.n[pixels[some]]
-            set_of = np.empty((len(m) * number, 2))
-            set_places(s.seed, m, n, s.camera.pixels[0], 0, number, 0, fixed_places(number), set_of)
-            twice = np.tile(set_of.reshape(-1, number, 2), (1, 2, 1))
-            # a body stands in its strip in the same place in all pixels
-            twice[:, :number] = (twice[:, :number] + np.outer(m + 1.6 * n, SHIFTS)[:, None]) % 1.0
-            kernels.strip_places(strip[some], twice, shares := np.empty(twice.shape[:2]))
-            L, D, weights = s.camera.weighted_rays_at(m[:, None], n[:, None], twice)
-            light = s.shoot(
-                L.reshape(-1, 3), D.reshape(-1, 3), None if weights is None else weights.reshape(-1),
-                numbers=(m, n, 0, count), first=None, traced=np.empty(0, np.int32),
-            )  # fmt: skip
-            kernels.add_shares(light, shares, pixels[some], self.sums)
 
     def _look(self, places: Places, bodies: bool = False, finer: float = 1.0) -> int:
         """Look at places; return the row of the first of their points, of which ``bodies`` alone may be wanted."""
@@ -597,8 +451,9 @@ def edge_mean(
     lens = np.where((own | rim).reshape(lens.shape), lens, -1)
     cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, own)
     inside, points = np.flatnonzero(own)[order], cells.points
-    assert seen.object_id is not None and seen.shading_normal is not None
+    assert seen.object_id is not None and seen.shading_normal is not None and seen.ray_length is not None
     points.light[inside], points.body[inside], points.normal[inside] = centres, seen.object_id, seen.shading_normal
+    cells.reach[inside] = seen.ray_length
     around = np.flatnonzero(rim)
     if len(around):
         half = np.full(len(around), UNITS / 2, np.float32)
@@ -609,7 +464,7 @@ def edge_mean(
     return found, cells.rays[inside]
 
 
-Table = TypeVar("Table", Points, Places, Seen)
+Table = TypeVar("Table", Points, Places)
 
 
 def _part(table: Table, rows: slice | NDArray[np.int64]) -> Table:

@@ -22,12 +22,14 @@ from .kernels.attributes import footprints
 from .kernels.clear import pass_clear_face, pass_faces, start_inside, tell_inside
 from .kernels.lanes import PACKET, aligned, work
 from .kernels.light import add_unblocked, keep_unblocked
+from .kernels.looks import SAMPLES, Asked, Told, look_kernel, looking_room, told_room
 from .kernels.sampling import lobe_keys
 from .kernels.sky import add_sky_image
 from .kernels.spawn import reflect
 from .kernels.spawn import spawn as spawn_rays
 from .kernels.start import fill_start_tables, start_rays, start_separable_rays, usable
 from .kernels.tables import (
+    ALL_COLUMNS,
     COUNTS,
     EMBREE_TICKS,
     PASSED,
@@ -41,6 +43,7 @@ from .kernels.tables import (
 )  # fmt: skip
 from .kernels.way import record, way_kernel
 from .packing import PackedScene, packed
+from .sample_places import fixed_places
 from .support_images import RECORDED
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
@@ -48,6 +51,7 @@ _NO_ROWS = np.empty(0, np.int32)
 _NO_HITS = Hits(_NO_ROWS, *(np.empty(0, np.float32) for _ in range(3)))  # the kernel finds them
 _NO_NUMBERS = np.empty(0)
 _NO_START = Start(_NO_NUMBERS, _NO_NUMBERS, _NO_ROWS, _NO_ROWS, 0, 0)  # rays are in arrays
+_SETS = np.stack([np.resize(fixed_places(count), (16, 2)) for count in (4, 8, 12, 16)])
 LOBE_RAYS = 16  # over the lobe of a rough mirror, for each pixel
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
@@ -251,6 +255,7 @@ class Tracer:
         self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
         self._told = _NO_NUMBERS, False  # whether rays of these tables may start within glass
         self._follow = way_kernel(self.scene.intersector.width)
+        self._looks, self._looking = look_kernel(self.scene.intersector.width), looking_room(_SETS)
         # hits and shadow rays that the kernel does not see to the end
         self._finds = self._tools.nearest.packet != 0 and not self.scene.passes
         self._later = self._tools.occluded.packet == 0 or self.scene.lets_through
@@ -303,16 +308,22 @@ class Tracer:
         found[room.pixels[:n]] = np.where(faces >= 0, self.scene.object_of_face[faces], -1)
         return found
 
-    def seen(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> Hits:
-        """Return the nearest hits of rays in the scene's frame, as Embree places them: see `sees_bodies`."""
-        self.count.rays["primary"] += len(origins)
-        return self._nearest(origins, directions, placed=False)
+    def look(self, asked: Asked, by_body: bool, pixel: tuple[float, float]) -> Told:
+        """Return what pixels show, by visibility alone: see `sees_bodies`."""
+        s, count = self.scene, len(asked.body)
+        told, f = told_room(count), s.surfaces
+        made = self._looks(
+            asked, f.rows, f.columns, f.columns == ALL_COLUMNS, by_body, *pixel, self._tools,
+            s.intersector.first_of_same, self._work, self._looking, told,
+        )  # fmt: skip
+        self.count.rays["primary"] += int(told.rays.sum())
+        return Told(*told[:SAMPLES], *(array[:made] for array in told[SAMPLES:]))
 
     def shade(
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], hits: Hits,
         keys: NDArray[np.uint64] | None,
     ) -> NDArray[np.float32]:  # fmt: skip
-        """Return the light (n, 3) that camera rays of `seen` bring; ``keys`` are as of `run`."""
+        """Return the light (n, 3) that camera rays with known hits bring; ``keys`` are as of `run`."""
         room, n = self._primary._replace(pixels=self._pixels), len(origins)
         room.origins[:n], room.directions[:n], room.weights[:n], room.inside[:n] = origins, directions, 1, -1
         if keys is not None:
@@ -325,6 +336,11 @@ class Tracer:
     def sees_bodies(self) -> bool:
         """Whether the nearest face of a ray is there: not cut out, not within another body, not seen through."""
         return not (self.scene.passes or self.scene.blends)
+
+    @property
+    def looks(self) -> bool:
+        """Return whether visibility alone can tell the surfaces in a pixel."""
+        return self.sees_bodies and self._finds
 
     def _started(
         self, locations: NDArray[Any], directions: NDArray[Any], shares: NDArray[np.float64] | None,

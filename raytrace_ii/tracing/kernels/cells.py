@@ -15,20 +15,14 @@ from numpy.typing import NDArray
 from ii_core.base.jit import inline_kernel
 from ii_core.base.jit import lean_kernel as kernel
 
-from .tables import BODY, FACE, NORMALS
+from .looks import GROUPS
 
 UNITS = 1024  # of a pixel's side
 DONE, OPEN = 0, 2  # what becomes of a pixel
-GROUPS, ANGLES = 4, 16  # surfaces in a pixel, angles of the lines that part two
-PICKS = 3  # samples of a surface whose light is found
 # Share of a step of colour by which a pixel is wrong that an edge of this step crosses unseen, root mean square.
 MISSED = 0.3
 SAME_WAY = np.float32(0.94)  # least cosine between normals of one surface
-BEHIND = 2.0  # pixels to the plane of a surface, from which on it is another one
-OF_COUNTS = 0.25  # standard error of a share by samples, for one sample; it falls by their 3/4th power
-THINNEST = 0.002  # of a pixel, on either side of lines
 UNLIKE = 1.5  # how much more than the error wanted colours of one surface beside each other may cause
-BESIDE = 0.25  # of a pixel: samples so near to a side tell of the pixel beyond
 HALF_DIAGONAL = 0.75  # of a pixel, with something to spare
 WIDER, SPARE = 1.02, 0.01  # how much wider than rods strips around them are, times and in pixels
 MOST_STRIP = 0.5  # of a pixel
@@ -51,17 +45,6 @@ class Places(NamedTuple):
     pixel: NDArray[np.int32]
     x: NDArray[np.float32]
     y: NDArray[np.float32]
-
-
-class Seen(NamedTuple):
-    """Rays through places of pixels in the scene's frame, and what they hit, a row each."""
-
-    origins: NDArray[np.float32]
-    directions: NDArray[np.float32]
-    faces: NDArray[np.int32]
-    u: NDArray[np.float32]
-    v: NDArray[np.float32]
-    distances: NDArray[np.float32]
 
 
 @kernel
@@ -353,347 +336,38 @@ def strips(locations, directions, right, down, rods, one, strip):
         strip[i, 5] = 0.0 if not seen else (half if (high - low) * 2.0 * half < MOST_STRIP else -1.0)
 
 
-@inline_kernel
-def _across(strip, along):
-    middle = strip[3] + strip[4] * along
-    return min(max(middle - strip[5], 0.0), 1.0), min(max(middle + strip[5], 0.0), 1.0)
-
-
 @kernel
-def strip_places(strip, places, shares):
-    """Move the first half of the places (n, 2·count, 2) of pixels into their strips; ``shares`` (n, 2·count) of them.
-
-    Those of the second half lie in the whole pixel: they count if they are not in the strip. The shares of a pixel
-    are 1 together.
-    """
-    half = places.shape[1] // 2
-    for i in range(strip.shape[0]):
-        axis, low, high = int(strip[i, 0]), strip[i, 1], strip[i, 2]
-        area, outside = 0.0, 0
-        for j in range(half):
-            along = low + (high - low) * places[i, j, axis]
-            first, last = _across(strip[i], along)
-            shares[i, j] = (high - low) * (last - first) / half
-            area += shares[i, j]
-            places[i, j, 1 - axis] = first + (last - first) * places[i, j, 1 - axis]
-            places[i, j, axis] = along
-        for j in range(half, 2 * half):
-            first, last = _across(strip[i], places[i, j, axis])
-            inside = low <= places[i, j, axis] <= high and first <= places[i, j, 1 - axis] <= last
-            shares[i, j] = 0.0 if inside else 1.0
-            outside += not inside
-        for j in range(2 * half):
-            if j >= half:
-                shares[i, j] *= (1.0 - area) / max(outside, 1)
-            elif outside == 0:
-                shares[i, j] /= max(area, 1e-12)
-
-
-@kernel
-def add_shares(light, shares, pixels, sums):
-    """Mix the light (n·count, 3) of places of pixels by their shares (n, count)."""
-    count = shares.shape[1]
-    for i in range(pixels.shape[0]):
-        for c in range(3):
-            total = 0.0
-            for j in range(count):
-                total += shares[i, j] * light[i * count + j, c]
-            sums[pixels[i], c] = total
-
-
-@kernel
-def aim(locations, directions, places, rotation, shift, origins, out):
-    """Rays (p·n, 3) through places (p, n, 2) of pixels, in the scene's frame and of length 1.
-
-    They are even between those (p, 3, 3) through the centre, the middle of the right side and that of the lower one.
-    """
-    count = places.shape[1]
-    for i in range(places.shape[0]):
-        for j in range(count):
-            a, b, row = 2.0 * places[i, j, 0] - 1.0, 2.0 * places[i, j, 1] - 1.0, i * count + j
-            square = 0.0
-            for c in range(3):
-                place, way = shift[c], 0.0
-                for k in range(3):
-                    l, d = locations[i, 0, k], directions[i, 0, k]
-                    place += rotation[c, k] * (l + a * (locations[i, 1, k] - l) + b * (locations[i, 2, k] - l))
-                    way += rotation[c, k] * (d + a * (directions[i, 1, k] - d) + b * (directions[i, 2, k] - d))
-                origins[row, c], out[row, c] = place, way
-                square += way * way
-            inverse = 1.0 / math.sqrt(square) if square > 0.0 else 0.0
-            for c in range(3):
-                out[row, c] *= inverse
-
-
-@kernel
-def part(seen, places, rows, columns, smooth, by_body, width, spread, surface, groups, many):
-    """Part the samples of pixels into up to `GROUPS` surfaces.
-
-    ``surface`` (`GROUPS`, 7) is room for body, normal and place of a surface. ``groups`` (p, n) are the surfaces of
-    samples, that of the first is 0; ``many`` (p,) how many there are, one more if too many. Pixels are ``width`` wide where their rays start and grow by ``spread`` a mm.
-    """
-    count = places.shape[1]
-    for i in range(places.shape[0]):
-        found, too_many = 0, False
-        for j in range(count):
-            row = i * count + j
-            f, body, x, y, z, px, py, pz = seen.faces[row], -1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            reach = 0.0
-            if f >= 0:
-                at, u, v, reach = f * columns, float(seen.u[row]), float(seen.v[row]), float(seen.distances[row])
-                body = int(rows[at + BODY])
-                x, y, z = float(rows[at + FACE]), float(rows[at + FACE + 1]), float(rows[at + FACE + 2])
-                if smooth and (rows[at + NORMALS] != 0 or rows[at + NORMALS + 1] != 0 or rows[at + NORMALS + 2] != 0):
-                    w = 1.0 - u - v
-                    at += NORMALS
-                    x = w * rows[at] + u * rows[at + 3] + v * rows[at + 6]
-                    y = w * rows[at + 1] + u * rows[at + 4] + v * rows[at + 7]
-                    z = w * rows[at + 2] + u * rows[at + 5] + v * rows[at + 8]
-                    length = math.sqrt(x * x + y * y + z * z)
-                    x, y, z = x / length, y / length, z / length
-                px = seen.origins[row, 0] + reach * seen.directions[row, 0]
-                py = seen.origins[row, 1] + reach * seen.directions[row, 1]
-                pz = seen.origins[row, 2] + reach * seen.directions[row, 2]
-            mine, away = -1, BEHIND * (width + spread * reach)
-            for g in range(found):
-                if mine < 0 and int(surface[g, 0]) == body:
-                    nx, ny, nz = surface[g, 1], surface[g, 2], surface[g, 3]
-                    off = nx * (px - surface[g, 4]) + ny * (py - surface[g, 5]) + nz * (pz - surface[g, 6])
-                    if body < 0 or by_body or (nx * x + ny * y + nz * z >= SAME_WAY and abs(off) <= away):
-                        mine = g
-            if mine < 0:
-                if found == GROUPS:
-                    too_many, mine = True, GROUPS - 1
-                else:
-                    mine = found
-                    surface[mine, 0], surface[mine, 1], surface[mine, 2], surface[mine, 3] = body, x, y, z
-                    surface[mine, 4], surface[mine, 5], surface[mine, 6] = px, py, pz
-                    found += 1
-            groups[i, j] = mine
-        many[i] = found + too_many
-
-
-@kernel
-def pick(places, groups, many, known, picks):
-    """Choose samples (p, `GROUPS`, `PICKS`) of surfaces that are not yet ``known``, as far apart as may be; −1 if none.
-
-    The first is that in the middle of the surface; of the first surface it is the pixel's centre, sample 0.
-    """
-    for i in range(places.shape[0]):
-        for g in range(GROUPS):
-            for k in range(PICKS):
-                picks[i, g, k] = -1
-        for g in range(known[i], min(many[i], GROUPS)):
-            x, y, count = 0.0, 0.0, 0
-            for j in range(places.shape[1]):
-                if groups[i, j] == g:
-                    x, y, count = x + places[i, j, 0], y + places[i, j, 1], count + 1
-            x, y = x / count, y / count
-            for k in range(min(PICKS, count)):
-                best, most = -1, -1.0
-                for j in range(places.shape[1]):
-                    if groups[i, j] == g:
-                        if k == 0:
-                            far = 4.0 - _square(places, i, j, x, y) + (4.0 if g == 0 and j == 0 else 0.0)
-                        else:
-                            far = math.inf
-                            for before in range(k):
-                                other = picks[i, g, before]
-                                far = min(far, _square(places, i, j, places[i, other, 0], places[i, other, 1]))
-                        if far > most:
-                            best, most = j, far
-                picks[i, g, k] = best
-
-
-@inline_kernel
-def _square(places, i, j, x, y):
-    dx, dy = places[i, j, 0] - x, places[i, j, 1] - y
-    return dx * dx + dy * dy
-
-
-@kernel
-def take_light(which, group, light, code, total, codes, low, high, count):
-    """Add light and codes of picked samples to their surfaces (p, `GROUPS`, 3), and note the span of the codes."""
-    for j in range(which.shape[0]):
-        i, g = which[j], group[j]
-        n = count[i, g]
-        for c in range(3):
-            total[i, g, c] = (total[i, g, c] * n + light[j, c]) / (n + 1)
-            codes[i, g, c] = (codes[i, g, c] * n + code[j, c]) / (n + 1)
-            low[i, g, c] = min(low[i, g, c], code[j, c]) if n > 0 else code[j, c]
-            high[i, g, c] = max(high[i, g, c], code[j, c]) if n > 0 else code[j, c]
-        count[i, g] = n + 1
-
-
-@inline_kernel
-def _below(nx, ny, t):
-    """Share of the unit square around 0 in which nx·x + ny·y < t."""
-    a, b = max(abs(nx), abs(ny)), min(abs(nx), abs(ny))
-    s, half, flat = abs(t), (a + b) / 2.0, (a - b) / 2.0
-    rest = max(half - s, 0.0)
-    more = s / a if s <= flat else 0.5 - rest * rest / (2.0 * a * max(b, 1e-12))
-    return 0.5 + (more if t > 0.0 else -more)
-
-
-@kernel
-def fit(places, groups, many, weights, turn, room, shares, errors, strip):
-    """Find the shares of surfaces (p, `GROUPS`) in pixels and their standard error, from places of samples.
-
-    Two surfaces that a straight line parts share the pixel by the mean of all lines that do; any others by the
-    ``weights`` (p, n) of their samples. Of lines, ``turn`` (p, 2) are the middle of their angles and how far they
-    go, before and afterwards, and ``strip`` (p, 6) is what all lines are in, see `strips`: half its thickness is 0
-    where none is. ``room`` (4, `ANGLES`) is for sums of the lines of one angle.
-    """
-    count = places.shape[1]
-    for i in range(places.shape[0]):
-        for g in range(GROUPS):
-            shares[i, g] = 0.0
-        for j in range(count):
-            shares[i, groups[i, j]] += weights[i, j]
-        strip[i, 5] = 0.0
-        missed = 0.0
-        for g in range(GROUPS):
-            missed = max(missed, 4.0 * shares[i, g] * (1.0 - shares[i, g]))
-        errors[i] = OF_COUNTS * count ** -0.75 if many[i] > 1 else 0.0
-        if many[i] != 2:
-            continue
-        middle, wide = turn[i, 0], turn[i, 1]
-        total, mean, square, best, most = 0.0, 0.0, 0.0, -1, 0.0
-        for k in range(ANGLES):
-            angle = middle + wide * ((2 * k + 1.0) / ANGLES - 1.0)
-            nx, ny = math.cos(angle), math.sin(angle)
-            low0, high0, low1, high1 = math.inf, -math.inf, math.inf, -math.inf
-            for j in range(count):
-                along = nx * (places[i, j, 0] - 0.5) + ny * (places[i, j, 1] - 0.5)
-                if groups[i, j] == 0:
-                    low0, high0 = min(low0, along), max(high0, along)
-                else:
-                    low1, high1 = min(low1, along), max(high1, along)
-            half = (abs(nx) + abs(ny)) / 2.0
-            turned = low0 >= high1
-            low, high = (high1, low0) if turned else (high0, low1)
-            low, high = max(low, -half), min(high, half)
-            room[0, k], room[1, k], room[2, k], room[3, k] = nx, ny, low, high
-            weight = high - low
-            if weight > 0.0:
-                share = _below(nx, ny, (low + high) / 2.0)
-                share = 1.0 - share if turned else share
-                total, mean = total + weight, mean + weight * share
-                square += weight * (share * share + weight * weight / 12.0)
-                if weight > most:
-                    best, most = k, weight
-        if best < 0:
-            continue
-        mean /= total
-        shares[i, 0], shares[i, 1] = mean, 1.0 - mean
-        errors[i] = math.sqrt(max(square / total - mean * mean, 0.0))
-        _around(room, best, strip[i])
-        farthest = 0.5
-        for k in range(ANGLES):
-            if room[3, k] > room[2, k]:
-                farthest = max(farthest, abs(k - best) + 1.0)
-        turn[i, 0] = middle + wide * ((2 * best + 1.0) / ANGLES - 1.0)
-        turn[i, 1] = min(wide * 2.0 * farthest / ANGLES, wide)
-
-
-@inline_kernel
-def _around(room, best, strip):
-    """The strip around all lines of `fit`, along that of the best angle."""
-    nx, ny = room[0, best], room[1, best]
-    t = (room[2, best] + room[3, best]) / 2.0
-    swap = abs(nx) > abs(ny)
-    a, b = (ny, nx) if swap else (nx, ny)
-    slope, height, away = -a / b, t / b, 0.0
-    for k in range(ANGLES):
-        if room[3, k] > room[2, k]:
-            p, q = (room[1, k], room[0, k]) if swap else (room[0, k], room[1, k])
-            q = q if abs(q) > 1e-3 else 1e-3
-            for end in range(4):
-                along, t = (0.5 if end % 2 else -0.5), room[2 + end // 2, k]
-                away = max(away, abs((t - p * along) / q - height - slope * along))
-    strip[0], strip[1], strip[2] = 1.0 if swap else 0.0, 0.0, 1.0
-    strip[3], strip[4], strip[5] = height + 0.5 - 0.5 * slope, slope, min(away, 1.0) + THINNEST
-
-
-@kernel
-def into_strips(strip, places, old, weights):
-    """Move new places (p, m, 2), the last of ``weights`` (p, n), into strips; before them stand ``old`` (p, n − m, 2).
-
-    Those that stand beside the strip have what it leaves of the pixel.
-    """
-    first, count = old.shape[1], places.shape[1]
-    for i in range(places.shape[0]):
-        axis, area, outside = int(strip[i, 0]), 0.0, 0
-        for j in range(count):
-            along = places[i, j, axis]
-            low, high = _across(strip[i], along)
-            weights[i, first + j] = (high - low) / count
-            area += weights[i, first + j]
-            places[i, j, 1 - axis] = low + (high - low) * places[i, j, 1 - axis]
-        for j in range(first):
-            low, high = _across(strip[i], old[i, j, axis])
-            beside = not (low <= old[i, j, 1 - axis] <= high)
-            weights[i, j] = 1.0 if beside else 0.0
-            outside += beside
-        for j in range(first + count):
-            if j < first:
-                weights[i, j] *= (1.0 - area) / max(outside, 1)
-            elif outside == 0:
-                weights[i, j] /= max(area, 1e-12)
-
-
-@inline_kernel
-def _step(codes, i, a, b):
-    c = codes
-    return max(abs(c[i, a, 0] - c[i, b, 0]), max(abs(c[i, a, 1] - c[i, b, 1]), abs(c[i, a, 2] - c[i, b, 2])))
-
-
-@kernel
-def contrast(many, codes, errors):
-    """Turn errors of shares into errors of codes (p, `GROUPS`, 3), by the largest step between surfaces."""
-    for i in range(many.shape[0]):
-        most = np.float32(0)
-        for a in range(1, min(many[i], GROUPS)):
-            for b in range(a):
-                most = max(most, _step(codes, i, a, b))
-        errors[i] *= most
-
-
-@kernel
-def mix(pixels, places, groups, many, bodies, shares, light, codes, low, high, points, error, lens, sums, verdict, wanted):
-    """Mix the light (p, `GROUPS`, 3) of surfaces by their shares.
+def mix(pixels, told, light, codes, low, high, points, error, lens, sums, verdict, wanted):
+    """Mix the light (p, `GROUPS`, 3) of surfaces by their shares; return the sum of the squares of errors, in codes.
 
     A pixel stays `OPEN` with too many surfaces, or if the codes of one's samples go from ``low`` to ``high`` values
     that are too far apart. Pixels are ``wanted`` beside which a surface is seen that their centres do not show.
     """
     height, width = lens.shape
+    squares = 0.0
     for i in range(pixels.shape[0]):
-        pixel = pixels[i]
-        y, x = pixel // width, pixel % width
-        good = many[i] <= GROUPS
-        for g in range(min(many[i], GROUPS)):
-            span = np.float32(0)
+        pixel, many, most = pixels[i], min(told.many[i], GROUPS), np.float32(0)
+        y, x, good = pixel // width, pixel % width, told.many[i] <= GROUPS
+        for g in range(many):
             for c in range(3):
-                span = max(span, high[i, g, c] - low[i, g, c])
-            good &= span * MISSED * shares[i, g] <= UNLIKE * error
+                span = high[i, g, c] - low[i, g, c]
+                good &= span * MISSED * told.shares[i, g] <= UNLIKE * error
+                for before in range(g):
+                    most = max(most, abs(codes[i, g, c] - codes[i, before, c]))
         verdict[i] = DONE if good else OPEN
+        squares += (told.errors[i] * most) ** 2 if good else 0.0
         for c in range(3):
             total = 0.0
-            for g in range(min(many[i], GROUPS)):
-                total += shares[i, g] * light[i, g, c]
+            for g in range(many):
+                total += told.shares[i, g] * light[i, g, c]
             sums[pixel, c] = total
-        for j in range(places.shape[1]):
-            g = groups[i, j]
-            for side in range(4):
-                b, a = y + (side == 2) - (side == 0), x + (side == 1) - (side == 3)
-                if not (0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]):
-                    continue
-                place = places[i, j, 0 if side % 2 else 1]
-                near = place < BESIDE if side == 0 or side == 3 else place > 1.0 - BESIDE
+        for side in range(4):
+            b, a = y + (side == 2) - (side == 0), x + (side == 1) - (side == 3)
+            if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
                 q = b * width + a
-                if near and points.body[q] != bodies[i, g]:
-                    step = np.float32(0)
-                    for c in range(3):
-                        step = max(step, abs(points.code[q, c] - codes[i, g, c]))
-                    if step * MISSED > error:
-                        wanted[q] = True
+                for g in range(many):
+                    if told.near[i, side] >> g & 1 and points.body[q] != told.bodies[i, g]:
+                        for c in range(3):
+                            if abs(points.code[q, c] - codes[i, g, c]) * MISSED > error:
+                                wanted[q] = True
+    return squares
