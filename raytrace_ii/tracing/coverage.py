@@ -1,7 +1,7 @@
 """Coverage: which share of each pixel the bodies have, by visibility alone.
 
-Pixels around which one body is seen are that body's. Any others are parted as by `edges`: two bodies share a pixel by
-the lines that part them. Where small bodies may be, it gets `SAMPLES`. Rays pass the middle of an aperture.
+Every pixel is a cell of `edges` between its corners. One body at all corners and the centre has the pixel; two bodies
+share it by the chord of their edge; any other pixel gets `SAMPLES`. Rays pass the middle of an aperture.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .edges import FOLLOWED, Cells, Sight
+from .edges import Cells, Sight, _part, _places
 from .kernels import cells as kernels
-from .kernels.cells import OPEN, UNITS, Places, Points
+from .kernels.cells import CUT, OPEN, UNITS, Places, Points
 from .sampling import Edges, fixed_sum
 from .support_images import NAMES, name_hashes
 from .tracer import Support
@@ -29,9 +29,7 @@ Shares = tuple[Whole, Whole, NDArray[np.float64]]  # numbers of pixels, bodies, 
 
 @dataclass
 class Coverage(Cells):
-    """Pixels of bodies: each has a light of its own."""
-
-    by_body = True
+    """Cells of bodies: each has a light of its own, by which cells tell them apart and mix them."""
 
     def _trace(self, places: Places, points: Points, bodies: bool, finer: float) -> None:
         self.sight.check()
@@ -53,35 +51,33 @@ class Coverage(Cells):
 
     def shares(self, pixels: Whole) -> list[Shares]:
         """Return the shares of pixels."""
-        half, many = np.full(len(pixels), UNITS / 2, np.float32), self.lens.size
+        half, count = np.full(len(pixels), UNITS / 2, np.float32), len(pixels)
         self.look_around(Places(pixels.astype(np.int32), half, half))
-        kernels.encode(self.points.light[:many], self.curve, self.points.code)
-        steps, opened = np.zeros(many, np.float32), np.zeros(many, np.bool_)
-        kernels.doubtful(self.points, self.lens, self.own, self.wanted.error, steps, np.empty(many, np.bool_))
-        self._look_beyond(steps, steps)
-        strips = self._strips_of(pixels)
-        doubtful, left, found = (steps > 0) | (strips[:, 5] != 0), [pixels[:0]], []
-        for _ in range(FOLLOWED):
-            some = np.flatnonzero(doubtful & ~opened)
-            if not len(some):
-                break
-            opened[some] = True
-            if not self._looks():
-                left.append(some)
-                continue
-            told = self._looked(some, np.full(len(some), APART * LIGHT, np.float32), strips[some])
-            codes = ((told.bodies + 1) * LIGHT * APART).astype(np.float32)[:, :, None].repeat(3, axis=2)
-            verdict = np.empty(len(some), np.int8)
-            kernels.mix(
-                some, told, codes, codes, codes, codes, self.points, self.wanted.error, self.lens, self.sums, verdict,
-                doubtful,
-            )  # fmt: skip
-            left.append(some[verdict == OPEN])
-            which, group = np.nonzero((told.shares > 0) & (verdict != OPEN)[:, None])
-            found.append((some[which], told.bodies[which, group].astype(np.int64), told.shares[which, group]))
-        whole = pixels[~opened[pixels]]
-        alone = whole, self.points.body[whole].astype(np.int64), np.ones(len(whole))
-        return [alone, *found, self._sampled(np.concatenate(left))]
+        kernels.encode(self.points.light[: self.lens.size], self.curve, self.points.code)
+        corners, places = np.empty((count, 4), np.int32), _places(4 * count)
+        corner_of = np.full((self.lens.size, 4), -1, np.int32)
+        new = kernels.open_pixels(pixels, self.lens, corner_of, self._count, corners, places)
+        self._look(_part(places, slice(new)))
+        verdict, groups = np.empty(count, np.int8), np.zeros(count, np.int8)
+        kernels.judge(
+            pixels, corners, self.points, self.wanted.error, self.lens, self.sums, verdict, groups,
+            np.empty(count, np.float32), np.empty(self.lens.size, np.bool_),
+        )  # fmt: skip
+        if len(self.sight.rods):
+            verdict[self._touched(pixels)[0]] = OPEN
+        cut = np.flatnonzero(verdict == CUT)
+        if len(cut):
+            verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])
+        cut, done = np.flatnonzero(verdict == CUT), np.flatnonzero(verdict == kernels.DONE)
+        whole = pixels[done], self.points.body[pixels[done]].astype(np.int64), np.ones(len(done))
+        return [whole, self._two(pixels[cut], corners[cut]), self._sampled(pixels[verdict == OPEN])]
+
+    def _two(self, pixels: Whole, corners: NDArray[np.int32]) -> Shares:
+        """Return the shares of two bodies, by the mean of their lights."""
+        bodies = np.sort(self.points.body[corners].astype(np.int64), axis=1)[:, [0, 3]]
+        light = (bodies + 1) * LIGHT
+        second = (self.sums[pixels, 0] - light[:, 0]) / (light[:, 1] - light[:, 0])
+        return np.repeat(pixels, 2), bodies.reshape(-1), np.stack([1 - second, second], axis=1).reshape(-1)
 
     def _sampled(self, pixels: Whole) -> Shares:
         s, counted = self.sight, [np.empty(0, np.int64)]

@@ -22,14 +22,12 @@ from .kernels.attributes import footprints
 from .kernels.clear import pass_clear_face, pass_faces, start_inside, tell_inside
 from .kernels.lanes import PACKET, aligned, work
 from .kernels.light import add_unblocked, keep_unblocked
-from .kernels.looks import SAMPLES, Asked, Told, look_kernel, looking_room, told_room
 from .kernels.sampling import lobe_keys
 from .kernels.sky import add_sky_image
 from .kernels.spawn import reflect
 from .kernels.spawn import spawn as spawn_rays
 from .kernels.start import fill_start_tables, start_rays, start_separable_rays, usable
 from .kernels.tables import (
-    ALL_COLUMNS,
     COUNTS,
     EMBREE_TICKS,
     PASSED,
@@ -43,7 +41,6 @@ from .kernels.tables import (
 )  # fmt: skip
 from .kernels.way import record, way_kernel
 from .packing import PackedScene, packed
-from .sample_places import fixed_places
 from .support_images import RECORDED
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
@@ -51,7 +48,6 @@ _NO_ROWS = np.empty(0, np.int32)
 _NO_HITS = Hits(_NO_ROWS, *(np.empty(0, np.float32) for _ in range(3)))  # the kernel finds them
 _NO_NUMBERS = np.empty(0)
 _NO_START = Start(_NO_NUMBERS, _NO_NUMBERS, _NO_ROWS, _NO_ROWS, 0, 0)  # rays are in arrays
-_SETS = np.stack([np.resize(fixed_places(count), (16, 2)) for count in (4, 8, 12, 16)])
 LOBE_RAYS = 16  # over the lobe of a rough mirror, for each pixel
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
@@ -255,7 +251,6 @@ class Tracer:
         self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
         self._told = _NO_NUMBERS, False  # whether rays of these tables may start within glass
         self._follow = way_kernel(self.scene.intersector.width)
-        self._looks, self._looking = look_kernel(self.scene.intersector.width), looking_room(_SETS)
         # hits and shadow rays that the kernel does not see to the end
         self._finds = self._tools.nearest.packet != 0 and not self.scene.passes
         self._later = self._tools.occluded.packet == 0 or self.scene.lets_through
@@ -308,39 +303,10 @@ class Tracer:
         found[room.pixels[:n]] = np.where(faces >= 0, self.scene.object_of_face[faces], -1)
         return found
 
-    def look(self, asked: Asked, by_body: bool, pixel: tuple[float, float]) -> Told:
-        """Return what pixels show, by visibility alone: see `sees_bodies`."""
-        s, count = self.scene, len(asked.body)
-        told, f = told_room(count), s.surfaces
-        made = self._looks(
-            asked, f.rows, f.columns, f.columns == ALL_COLUMNS, by_body, *pixel, self._tools,
-            s.intersector.first_of_same, self._work, self._looking, told,
-        )  # fmt: skip
-        self.count.rays["primary"] += int(told.rays.sum())
-        return Told(*told[:SAMPLES], *(array[:made] for array in told[SAMPLES:]))
-
-    def shade(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], hits: Hits,
-        keys: NDArray[np.uint64] | None,
-    ) -> NDArray[np.float32]:  # fmt: skip
-        """Return the light (n, 3) that camera rays with known hits bring; ``keys`` are as of `run`."""
-        room, n = self._primary._replace(pixels=self._pixels), len(origins)
-        room.origins[:n], room.directions[:n], room.weights[:n], room.inside[:n] = origins, directions, 1, -1
-        if keys is not None:
-            room.keys[:n] = keys
-        self._trace(room, n, radiance := np.zeros((n, 3), np.float32), None, _NO_START, hits)
-        self.count.rays["primary"] -= n  # they are counted
-        return radiance
-
     @property
     def sees_bodies(self) -> bool:
         """Whether the nearest face of a ray is there: not cut out, not within another body, not seen through."""
         return not (self.scene.passes or self.scene.blends)
-
-    @property
-    def looks(self) -> bool:
-        """Return whether visibility alone can tell the surfaces in a pixel."""
-        return self.sees_bodies and self._finds
 
     def _started(
         self, locations: NDArray[Any], directions: NDArray[Any], shares: NDArray[np.float64] | None,
@@ -390,10 +356,9 @@ class Tracer:
         return self._told[1]
 
     def _trace(
-        self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None, start: Start,
-        hits: Hits = _NO_HITS,
-    ) -> None:  # fmt: skip
-        """Trace the first n of the primary rays, whose nearest hits may be known."""
+        self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None, start: Start
+    ) -> None:
+        """Trace the first n of the primary rays."""
         rays = _rows(primary, slice(n))
         self.count.rays["primary"] += n
         if self.scene.transmits and not len(start.rows):
@@ -401,19 +366,18 @@ class Tracer:
         for depth in range(self.max_depth + 1):
             lobe_rays = self.lobes[0] if depth == 0 else 1
             spawn = depth < self.max_depth
-            rays = self._generation(start, rays, radiance, support if depth == 0 else None, spawn, lobe_rays, hits)
-            start, hits = _NO_START, _NO_HITS
+            rays = self._generation(start, rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
+            start = _NO_START
             if not len(rays.pixels):
                 break
 
     def _generation(
         self, start: Start, rays: Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool,
-        lobe_rays: int, hits: Hits,
+        lobe_rays: int,
     ) -> Rays:  # fmt: skip
-        """Trace and shade one generation, whose hits may be known; the next one comes back."""
+        """Trace and shade one generation; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
-        if not self._finds and not len(hits.faces):
-            hits = self._hits(rays)
+        hits = _NO_HITS if self._finds else self._hits(rays)
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
         through, mirrored = n * (s.transmits + 2 * s.disperses + s.blends), n * (lobe_rays if s.glossy else 1)
         following = _room(through + mirrored if spawn else 0, s.nested, s.glossy, any(self.footprint))

@@ -15,19 +15,20 @@ from numpy.typing import NDArray
 from ii_core.base.jit import inline_kernel
 from ii_core.base.jit import lean_kernel as kernel
 
-from .looks import GROUPS
-
-UNITS = 1024  # of a pixel's side
-DONE, OPEN = 0, 2  # what becomes of a pixel
+UNITS = 1024  # of a pixel's side: edges are found on whole ones
+DONE, CUT, OPEN = 0, 1, 2  # what becomes of a cell
+FIRST, SECOND, NEITHER = 0, 1, 2  # groups of points
 # Share of a step of colour by which a pixel is wrong that an edge of this step crosses unseen, root mean square.
 MISSED = 0.3
 SAME_WAY = np.float32(0.94)  # least cosine between normals of one surface
-UNLIKE = 1.5  # how much more than the error wanted colours of one surface beside each other may cause
+WITHIN = 1.5  # how much more than pixels' centres the colours of one group of a cell may differ
+OWN = 0.3  # of the step between two colours: how far a point of one may be from it
 HALF_DIAGONAL = 0.75  # of a pixel, with something to spare
 WIDER, SPARE = 1.02, 0.01  # how much wider than rods strips around them are, times and in pixels
 MOST_STRIP = 0.5  # of a pixel
-LIKE = 0.4  # of a step, among the pixels around one
-MOST_GROUPS = 3  # of surfaces and colours around a pixel of a tile without fine structure
+LEAST_AWAY = 0.02  # pixels beside a chord at which it is checked
+LIKE = 0.4  # the same among the pixels around one
+MOST_GROUPS = 3  # of surfaces and colours around a pixel that is looked at as a cell
 
 
 class Points(NamedTuple):
@@ -45,6 +46,18 @@ class Places(NamedTuple):
     pixel: NDArray[np.int32]
     x: NDArray[np.float32]
     y: NDArray[np.float32]
+
+
+class Sides(NamedTuple):
+    """Sides of cells on which an edge is looked for: pixel, which of its sides, points at the left or upper end and
+    at the other, what is left of the way between them in units, and whether a third group was met."""
+
+    pixel: NDArray[np.int32]
+    side: NDArray[np.int32]
+    ends: NDArray[np.int32]
+    low: NDArray[np.int32]
+    high: NDArray[np.int32]
+    bad: NDArray[np.bool_]
 
 
 @kernel
@@ -84,61 +97,32 @@ def _one_surface(points, i, j):
 
 
 @kernel
-def doubtful(points, lens, own, error, steps, uneven):
+def doubtful(points, lens, own, error, steps):
     """Steps of colour, in codes, of the own pixels that may not be what is seen at their centres; 0 of others.
 
-    To a neighbour of another surface the whole step counts; on one surface, what a straight run of colours leaves:
-    pixels are ``uneven`` by that alone. At the border of a lens it is the step to the neighbour on the other side.
+    To a neighbour of another surface the whole step counts; on one surface, what a straight run of colours leaves.
+    At the border of a lens it is the step to the neighbour on the other side.
     """
     height, width = lens.shape
     for y in range(height):
         for x in range(width):
             i = y * width + x
-            most, bent = np.float32(0), np.float32(0)
+            most = np.float32(0)
             if own[i]:
                 for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
-                    one, other = _beside(lens, y, x, -dy, -dx), _beside(lens, y, x, dy, dx)
-                    first, second = one >= 0, other >= 0
-                    first, second = first and _one_surface(points, i, one), second and _one_surface(points, i, other)
-                    if first and second:
-                        bent = max(bent, _bend(points, one, i, other))
+                    one, other = -1, -1
+                    if 0 <= y - dy and 0 <= x - dx < width and lens[y - dy, x - dx] == lens[y, x]:
+                        one = (y - dy) * width + x - dx
+                    if y + dy < height and 0 <= x + dx < width and lens[y + dy, x + dx] == lens[y, x]:
+                        other = (y + dy) * width + x + dx
+                    if one >= 0 and other >= 0 and _one_surface(points, i, one) and _one_surface(points, i, other):
+                        for c in range(3):
+                            bend = points.code[one, c] - 2 * points.code[i, c] + points.code[other, c]
+                            most = max(most, abs(bend))
                     else:
-                        if first:
-                            bent = max(bent, _run(points, lens, i, one, _beside(lens, y, x, -2 * dy, -2 * dx)))
-                        elif one >= 0:
-                            most = max(most, _apart(points, i, one))
-                        if second:
-                            bent = max(bent, _run(points, lens, i, other, _beside(lens, y, x, 2 * dy, 2 * dx)))
-                        elif other >= 0:
-                            most = max(most, _apart(points, i, other))
-            uneven[i] = bent * MISSED > error
-            most = max(most, bent)
+                        most = max(most, _apart(points, i, one) if one >= 0 else np.float32(0))
+                        most = max(most, _apart(points, i, other) if other >= 0 else np.float32(0))
             steps[i] = most if most * MISSED > error else np.float32(0)
-
-
-@inline_kernel
-def _beside(lens, y, x, dy, dx):
-    """A pixel under the same lens so far away; −1 if there is none."""
-    height, width = lens.shape
-    b, a = y + dy, x + dx
-    return b * width + a if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x] else -1
-
-
-@inline_kernel
-def _bend(points, one, i, other):
-    bend = np.float32(0)
-    for c in range(3):
-        bend = max(bend, abs(points.code[one, c] - 2 * points.code[i, c] + points.code[other, c]))
-    return bend
-
-
-@inline_kernel
-def _run(points, lens, i, one, after):
-    """The step to a neighbour on one side, or what a straight run of colours beyond it leaves."""
-    step = _apart(points, i, one)
-    if after >= 0 and _one_surface(points, one, after):
-        step = min(step, _bend(points, i, one, after))
-    return step
 
 
 @kernel
@@ -336,38 +320,400 @@ def strips(locations, directions, right, down, rods, one, strip):
         strip[i, 5] = 0.0 if not seen else (half if (high - low) * 2.0 * half < MOST_STRIP else -1.0)
 
 
-@kernel
-def mix(pixels, told, light, codes, low, high, points, error, lens, sums, verdict, wanted):
-    """Mix the light (p, `GROUPS`, 3) of surfaces by their shares; return the sum of the squares of errors, in codes.
+@inline_kernel
+def _across(strip, along):
+    middle = strip[3] + strip[4] * along
+    return min(max(middle - strip[5], 0.0), 1.0), min(max(middle + strip[5], 0.0), 1.0)
 
-    A pixel stays `OPEN` with too many surfaces, or if the codes of one's samples go from ``low`` to ``high`` values
-    that are too far apart. Pixels are ``wanted`` beside which a surface is seen that their centres do not show.
+
+@kernel
+def strip_places(strip, places, shares):
+    """Move the first half of the places (n, 2·count, 2) of pixels into their strips; ``shares`` (n, 2·count) of them.
+
+    Those of the second half lie in the whole pixel: they count if they are not in the strip. The shares of a pixel
+    are 1 together.
     """
-    height, width = lens.shape
-    squares = 0.0
+    half = places.shape[1] // 2
+    for i in range(strip.shape[0]):
+        axis, low, high = int(strip[i, 0]), strip[i, 1], strip[i, 2]
+        area, outside = 0.0, 0
+        for j in range(half):
+            along = low + (high - low) * places[i, j, axis]
+            first, last = _across(strip[i], along)
+            shares[i, j] = (high - low) * (last - first) / half
+            area += shares[i, j]
+            places[i, j, 1 - axis] = first + (last - first) * places[i, j, 1 - axis]
+            places[i, j, axis] = along
+        for j in range(half, 2 * half):
+            first, last = _across(strip[i], places[i, j, axis])
+            inside = low <= places[i, j, axis] <= high and first <= places[i, j, 1 - axis] <= last
+            shares[i, j] = 0.0 if inside else 1.0
+            outside += not inside
+        for j in range(2 * half):
+            if j >= half:
+                shares[i, j] *= (1.0 - area) / max(outside, 1)
+            elif outside == 0:
+                shares[i, j] /= max(area, 1e-12)
+
+
+@kernel
+def add_shares(light, shares, pixels, sums):
+    """Mix the light (n·count, 3) of places of pixels by their shares (n, count)."""
+    count = shares.shape[1]
     for i in range(pixels.shape[0]):
-        pixel, many, most = pixels[i], min(told.many[i], GROUPS), np.float32(0)
-        y, x, good = pixel // width, pixel % width, told.many[i] <= GROUPS
-        for g in range(many):
-            for c in range(3):
-                span = high[i, g, c] - low[i, g, c]
-                good &= span * MISSED * told.shares[i, g] <= UNLIKE * error
-                for before in range(g):
-                    most = max(most, abs(codes[i, g, c] - codes[i, before, c]))
-        verdict[i] = DONE if good else OPEN
-        squares += (told.errors[i] * most) ** 2 if good else 0.0
         for c in range(3):
             total = 0.0
-            for g in range(many):
-                total += told.shares[i, g] * light[i, g, c]
-            sums[pixel, c] = total
+            for j in range(count):
+                total += shares[i, j] * light[i * count + j, c]
+            sums[pixels[i], c] = total
+
+
+@inline_kernel
+def _right_down(corner):
+    """A corner's place, in pixels right and down; corners and sides run around from the left top, side 0 on top."""
+    return int(corner == 1 or corner == 2), int(corner >= 2)
+
+
+@kernel
+def open_pixels(pixels, lens, corner_of, next_point, corners, places):
+    """Give pixels their corners, which pixels under one lens share.
+
+    ``corner_of`` (pixels, 4) are the points at corners, in the row of the first pixel of those that share them; −1
+    where there is none yet. New points, from ``next_point`` on, have ``places``.
+
+    Returns
+    -------
+    int
+        How many points are new.
+    """
+    height, width = lens.shape
+    new = 0
+    for i in range(pixels.shape[0]):
+        pixel = pixels[i]
+        y, x = pixel // width, pixel % width
+        for k in range(4):
+            right, down = _right_down(k)
+            owner, slot, found = pixel, k, False
+            for other in range(4):
+                b, a = y + down - 1 + other // 2, x + right - 1 + other % 2
+                if not found and 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
+                    owner, r, d, found = b * width + a, x + right - a, y + down - b, True
+                    slot = 3 - r if d == 1 else r
+            if corner_of[owner, slot] < 0:
+                corner_of[owner, slot] = next_point + new
+                places.pixel[new], places.x[new], places.y[new] = pixel, right * UNITS, down * UNITS
+                new += 1
+            corners[i, k] = corner_of[owner, slot]
+    return new
+
+
+@inline_kernel
+def _group(points, i, a, b, surfaces, step):
+    """To which of two points a third belongs: by surface if they are on two, else by colour."""
+    found = NEITHER
+    if surfaces and points.body[a] != points.body[b]:
+        found = FIRST if points.body[i] == points.body[a] else found
+        found = SECOND if points.body[i] == points.body[b] else found
+    elif points.body[i] == points.body[a] and surfaces:
+        one, other = _along(points, i, a), _along(points, i, b)
+        if max(one, other) >= SAME_WAY:
+            found = FIRST if one >= other else SECOND
+    elif points.body[i] == points.body[a]:
+        off, away = _apart(points, i, a), _apart(points, i, b)
+        if min(off, away) <= OWN * step:
+            found = FIRST if off <= away else SECOND
+    return found
+
+
+@kernel
+def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wanted):
+    """Decide what becomes of each cell; ``sums`` are the light of those done.
+
+    ``groups`` are the corners, as bits, in the second group of a cell to cut. ``steps`` are those of cells not done.
+    Pixels beyond a side that an edge crosses are ``wanted``.
+    """
+    height, width = lens.shape
+    q, light = points.code, points.light
+    for i in range(pixels.shape[0]):
+        pixel, k = pixels[i], corners[i]
+        p0, p1, p2, p3 = k[0], k[1], k[2], k[3]
+        surfaces = _one_surface(points, p1, p0) and _one_surface(points, p2, p0) and _one_surface(points, p3, p0)
+        surfaces &= _one_surface(points, pixel, p0)
+        most, wrong = np.float32(0), np.float32(0)
+        for c in range(3):
+            low = min(min(q[p0, c], q[p1, c]), min(min(q[p2, c], q[p3, c]), q[pixel, c]))
+            high = max(max(q[p0, c], q[p1, c]), max(max(q[p2, c], q[p3, c]), q[pixel, c]))
+            most = max(most, high - low)
+            mean = np.float32(0.25) * (q[p0, c] + q[p1, c] + q[p2, c] + q[p3, c])
+            saddle = np.float32(0.5) * abs(q[p0, c] + q[p2, c] - q[p1, c] - q[p3, c])
+            wrong = max(wrong, max(saddle, 2 * abs(q[pixel, c] - mean)))
+        if (wrong if surfaces else most) * MISSED <= error:
+            verdict[i] = DONE
+            for c in range(3):  # exact to the second order
+                mean = 0.25 * (float(light[p0, c]) + float(light[p1, c]) + float(light[p2, c]) + float(light[p3, c]))
+                sums[pixel, c] = (mean + 2.0 * light[pixel, c]) / 3.0
+            continue
+        first, second = p0, p0
+        if surfaces:  # the two colours farthest apart
+            far = np.float32(0)
+            for a in range(4):
+                for b in range(a + 1):
+                    other = k[b] if b < a else pixel
+                    step = _apart(points, k[a], other)
+                    if step > far:
+                        far, first, second = step, k[a], other
+        else:
+            for a in range(4):
+                other = k[a + 1] if a < 3 else pixel
+                if second == p0 and not _one_surface(points, other, p0):
+                    second = other
+        bits, good = 0, True
+        for a in range(4):
+            group = _group(points, k[a], first, second, not surfaces, most)
+            good &= group != NEITHER
+            bits |= (1 << a) if group == SECOND else 0
+        centre = _group(points, pixel, first, second, not surfaces, most)
+        good &= centre != NEITHER
+        for a in range(4):
+            for b in range(a + 1):
+                alike = (bits >> a & 1) == ((bits >> b & 1) if b < a else centre)
+                if alike and _apart(points, k[a], k[b] if b < a else pixel) * MISSED > WITHIN * error:
+                    good = False
+        one_edge = bits != 0 and bits != 5 and bits != 10 and bits != 15
+        verdict[i], groups[i], steps[i] = CUT if good and one_edge else OPEN, bits, most
+        y, x = pixel // width, pixel % width
         for side in range(4):
             b, a = y + (side == 2) - (side == 0), x + (side == 1) - (side == 3)
-            if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
-                q = b * width + a
-                for g in range(many):
-                    if told.near[i, side] >> g & 1 and points.body[q] != told.bodies[i, g]:
-                        for c in range(3):
-                            if abs(points.code[q, c] - codes[i, g, c]) * MISSED > error:
-                                wanted[q] = True
-    return squares
+            beside = 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]
+            if beside and _apart(points, k[side], k[(side + 1) % 4]) * MISSED > error:
+                wanted[b * width + a] = True
+
+
+@inline_kernel
+def _differs(points, i, j, error):
+    return points.body[i] != points.body[j] and _apart(points, i, j) * MISSED > error
+
+
+@kernel
+def find_thin(pixels, corners, points, error, lens, thin):
+    """Mark pixels around places of a body that no place beside them has: centres among corners, and the other way."""
+    height, width = lens.shape
+    for i in range(pixels.shape[0]):
+        y, x = pixels[i] // width, pixels[i] % width
+        alone = True
+        for k in range(4):
+            right, down = _right_down(k)
+            alone &= _differs(points, pixels[i], corners[i, k], error)
+            corner_alone = True
+            for around in range(4):
+                b, a = y + down - 1 + around // 2, x + right - 1 + around % 2
+                if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
+                    corner_alone &= _differs(points, corners[i, k], b * width + a, error)
+            if corner_alone:
+                _mark(lens, y + down - 1, y + down, x + right - 1, x + right, lens[y, x], thin)
+        if alone:
+            _mark(lens, y - 1, y + 1, x - 1, x + 1, lens[y, x], thin)
+
+
+@inline_kernel
+def _mark(lens, top, bottom, left, right, of, out):
+    height, width = lens.shape
+    for b in range(max(top, 0), min(bottom + 1, height)):
+        for a in range(max(left, 0), min(right + 1, width)):
+            if lens[b, a] == of:
+                out[b * width + a] = True
+
+
+@kernel
+def follow(pixels, codes, points, error, lens, wanted):
+    """Mark the pixels around those whose mean is not the light of their centre."""
+    width = lens.shape[1]
+    for i in range(pixels.shape[0]):
+        apart, y, x = np.float32(0), pixels[i] // width, pixels[i] % width
+        for c in range(3):
+            apart = max(apart, abs(codes[i, c] - points.code[pixels[i], c]))
+        if apart > error:
+            _mark(lens, y - 1, y + 1, x - 1, x + 1, lens[y, x], wanted)
+
+
+@kernel
+def gather_sides(pixels, corners, groups, lens, side_of, sides, of_cell):
+    """Note the sides of cells that pass from one group to the other, each once; ``of_cell`` are those of each cell.
+
+    ``side_of`` (pixels, 4) is −1 everywhere.
+
+    Returns
+    -------
+    int
+        How many there are.
+    """
+    width = lens.shape[1]
+    made = 0
+    for i in range(pixels.shape[0]):
+        pixel = pixels[i]
+        y, x = pixel // width, pixel % width
+        for side in range(4):
+            after = (side + 1) % 4
+            of_cell[i, side] = -1
+            if (groups[i] >> side & 1) == (groups[i] >> after & 1):
+                continue
+            owner, slot = pixel, side
+            if side == 0 and y > 0 and lens[y - 1, x] == lens[y, x]:
+                owner, slot = pixel - width, 2
+            elif side == 3 and x > 0 and lens[y, x - 1] == lens[y, x]:
+                owner, slot = pixel - 1, 1
+            if side_of[owner, slot] < 0:
+                side_of[owner, slot] = made
+                sides.pixel[made], sides.side[made] = pixel, side
+                sides.ends[made, 0] = corners[i, side if side < 2 else after]
+                sides.ends[made, 1] = corners[i, after if side < 2 else side]
+                sides.low[made], sides.high[made], sides.bad[made] = 0, UNITS, False
+                made += 1
+            of_cell[i, side] = side_of[owner, slot]
+    return made
+
+
+@kernel
+def probe_sides(sides, points, error, bodies, which, places):
+    """Places halfway along what is left of those sides whose crossing is not yet known well enough.
+
+    Returns
+    -------
+    seen, shaded : int
+        How many there are; ``which`` are their sides. For those in front the body alone tells, if ``bodies``; the
+        others stand at the back.
+    """
+    front, back = 0, sides.pixel.shape[0]
+    for i in range(sides.pixel.shape[0]):
+        left = sides.high[i] - sides.low[i]
+        one, other = sides.ends[i, 0], sides.ends[i, 1]
+        # two crossings, each anywhere in what is left: a standard error of 0.2 of it
+        if sides.bad[i] or left <= 1 or 0.2 / UNITS * left * _apart(points, one, other) <= 0.6 * error:
+            continue
+        row = back - 1
+        if bodies and points.body[one] != points.body[other]:
+            row = front
+            front += 1
+        else:
+            back -= 1
+        which[row], places.pixel[row] = i, sides.pixel[i]
+        at, side = (sides.low[i] + sides.high[i]) // 2, sides.side[i]
+        places.x[row] = at if side == 0 or side == 2 else (UNITS if side == 1 else 0)
+        places.y[row] = at if side == 1 or side == 3 else (UNITS if side == 2 else 0)
+    return front, sides.pixel.shape[0] - back
+
+
+@kernel
+def narrow_sides(sides, which, first, points):
+    """Take what the places of `probe_sides` show, points from ``first`` on, to their sides."""
+    for j in range(which.shape[0]):
+        i = which[j]
+        one, other = sides.ends[i, 0], sides.ends[i, 1]
+        step = _apart(points, one, other)
+        group = _group(points, first + j, one, other, not _one_surface(points, one, other), step)
+        at = (sides.low[i] + sides.high[i]) // 2
+        if group == FIRST:
+            sides.low[i] = at
+        elif group == SECOND:
+            sides.high[i] = at
+        else:
+            sides.bad[i] = True
+
+
+@inline_kernel
+def _ends_of_groups(points, corners, i, bits):
+    """A corner of each group, and the largest step between corners."""
+    first, second, step = corners[i, 0], corners[i, 0], np.float32(0)
+    for a in range(4):
+        if (bits >> a & 1) == 0:
+            first = corners[i, a]
+        else:
+            second = corners[i, a]
+        for b in range(a):
+            step = max(step, _apart(points, corners[i, a], corners[i, b]))
+    return first, second, step
+
+
+@kernel
+def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shares, places):
+    """Cut cells by the chord between the crossings of their sides; two places beside its middle are to be looked at.
+
+    ``shares`` are the parts of the first groups. A cell is `OPEN` if a side is bad, or its centre is on the other
+    side than its group.
+    """
+    for i in range(pixels.shape[0]):
+        bits = groups[i]
+        ax, ay, bx, by, met, bad = 0.0, 0.0, 0.0, 0.0, 0, False
+        twice, x0, y0, lastx, lasty, begun = 0.0, 0.0, 0.0, 0.0, 0.0, False
+        for turn in range(8):  # corners of the first group and crossings, around: twice the area between them
+            side = turn // 2
+            right, down = _right_down(side)
+            px, py, counts = float(right), float(down), (bits >> side & 1) == 0
+            if turn % 2:
+                s = of_cell[i, side]
+                counts = s >= 0
+                if counts:
+                    bad |= sides.bad[s]
+                    t = (sides.low[s] + sides.high[s]) / (2.0 * UNITS)
+                    px, py = (t if side == 0 or side == 2 else px), (t if side == 1 or side == 3 else py)
+                    ax, ay = (px, py) if met == 0 else (ax, ay)
+                    bx, by = (px, py) if met == 1 else (bx, by)
+                    met += 1
+            if counts:
+                if begun:
+                    twice += lastx * py - px * lasty
+                else:
+                    x0, y0, begun = px, py, True
+                lastx, lasty = px, py
+        shares[i] = abs(twice + lastx * y0 - x0 * lasty) / 2.0
+        first, second, step = _ends_of_groups(points, corners, i, bits)
+        mx, my = (ax + bx) / 2.0, (ay + by) / 2.0
+        length = max(math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay)), 1e-9)
+        nx, ny = (by - ay) / length, (ax - bx) / length
+        far0, far1 = 0.0, 0.0  # across the chord, to the farthest corner of either group
+        for a in range(4):
+            right, down = _right_down(a)
+            across = (right - mx) * nx + (down - my) * ny
+            if (bits >> a & 1) == 0:
+                far0 = across if abs(across) > abs(far0) else far0
+            else:
+                far1 = across if abs(across) > abs(far1) else far1
+        away = min(max(2.0 * error / max(float(step), 1.0), LEAST_AWAY), 0.2)
+        for k in range(2):
+            far = far0 if k == 0 else far1
+            off = min(away, 0.6 * abs(far)) * (1.0 if far >= 0.0 else -1.0)
+            places.pixel[2 * i + k] = pixels[i]
+            places.x[2 * i + k] = UNITS * min(max(mx + off * nx, 0.0), 1.0)
+            places.y[2 * i + k] = UNITS * min(max(my + off * ny, 0.0), 1.0)
+        across = (0.5 - mx) * nx + (0.5 - my) * ny
+        if abs(across) > away:
+            surfaces = not _one_surface(points, first, second)
+            expected = FIRST if (across > 0.0) == (far0 > 0.0) else SECOND
+            bad |= _group(points, pixels[i], first, second, surfaces, step) != expected
+        verdict[i] = OPEN if bad else CUT
+
+
+@kernel
+def confirm(pixels, corners, groups, shares, beside, points, error, verdict, sums):
+    """Find the light of cells cut; `OPEN` those at whose places of `chords` points, from ``beside`` on, disagree."""
+    light = points.light
+    for i in range(pixels.shape[0]):
+        bits, one, other = groups[i], beside + 2 * i, beside + 2 * i + 1
+        first, second, step = _ends_of_groups(points, corners, i, bits)
+        surfaces = not _one_surface(points, first, second)
+        good = _group(points, one, first, second, surfaces, step) == FIRST
+        good &= _group(points, other, first, second, surfaces, step) == SECOND
+        good &= _apart(points, one, first) * MISSED * shares[i] <= WITHIN * error
+        good &= _apart(points, other, second) * MISSED * (1.0 - shares[i]) <= WITHIN * error
+        if not good:
+            verdict[i] = OPEN
+            continue
+        for c in range(3):
+            mine, others, many = 0.0, 0.0, 0
+            for a in range(4):
+                if (bits >> a & 1) == 0:
+                    mine, many = mine + light[corners[i, a], c], many + 1
+                else:
+                    others += light[corners[i, a], c]
+            mine, others = 0.5 * (mine / many + light[one, c]), 0.5 * (others / (4 - many) + light[other, c])
+            sums[pixels[i], c] = shares[i] * mine + (1.0 - shares[i]) * others
