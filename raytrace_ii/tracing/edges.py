@@ -44,6 +44,7 @@ PILOTS, OF_PILOTS = 768, (4, 9)  # pixels of a tile that get two sets, which tel
 PILOTS_FILTER = 0.6  # times the width of a set's filter: what that errs alike in all sets scatters
 ALIKE = 0.8  # square of the difference of both in parts of the sum of the squares of their errors
 EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per roughness; powers of n by which it falls
+AS_MANY = 2.9  # samples of a set that err as much as corners and centre of a cell
 FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
 DONE_ERROR, CUT_ERROR = 0.5, 0.9  # of cells, in parts of the error wanted
 FOLLOWED, OF_THIN = 64, 16  # how far a thin body is followed, in pixels, and samples to find it
@@ -366,6 +367,7 @@ class Cells:
             return
         weights, error = np.maximum(rough[pixels], 1.0).astype(np.float64), self.wanted.error
         pilots = slice((every := max(len(pixels) // PILOTS, 4)) // 2, None, every)
+        cells = self.sums[pixels]
         edges, noise = self._pilot(pixels[pilots], float(np.mean(weights[pilots])))
         eighths, which, times = np.unique(
             np.rint(8 * np.log2(weights)).astype(np.int64), return_inverse=True, return_counts=True
@@ -375,7 +377,7 @@ class Cells:
         expected = weights**SPREAD_ERROR / np.average(weights**SPREAD_ERROR, weights=times)
         least = (EDGE * weights / (FAR * error) ** 2) ** (1 / EDGES_FALL)
         squares = error**2 * (len(pixels) + done * (1 - DONE_ERROR**2) + cut * (1 - CUT_ERROR**2))
-        of_sets = edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS
+        of_sets = (1 - _of_cell(SETS)) * (edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS)
         low, high = -10.0, 10.0
         for _ in range(30):
             middle = (low + high) / 2
@@ -386,7 +388,10 @@ class Cells:
         numbers = _numbers(np.maximum(2.0**high * weights**SPREAD, least)[which])
         todo = np.ones(len(pixels), np.bool_)
         todo[pilots] = numbers[pilots] > sum(OF_PILOTS)
+        numbers[~todo] = sum(OF_PILOTS)
         self._sample(pixels[todo], numbers[todo])
+        shares = _of_cell(numbers)[:, None]
+        self.sums[pixels] = shares * cells + (1 - shares) * self.sums[pixels]
 
     def _pilot(self, some: NDArray[np.int64], rough: float) -> tuple[float, float]:
         """Return the mean square errors, in codes, of a sample: of edges and of noise.
@@ -425,6 +430,11 @@ def _between(wanted: Floats) -> tuple[NDArray[np.int64], Floats]:
     at = np.interp(np.log2(wanted), np.log2(SETS), np.arange(len(SETS)))
     first = np.minimum(at.astype(np.int64), len(SETS) - 2)
     return first, at - first
+
+
+def _of_cell(numbers: NDArray[np.int64]) -> Floats:
+    """Return the weight of corners and centre of a cell beside a set of samples, by least squares at edges."""
+    return np.asarray(1 / (1 + (numbers / AS_MANY) ** EDGES_FALL))
 
 
 def _numbers(wanted: Floats) -> NDArray[np.int64]:

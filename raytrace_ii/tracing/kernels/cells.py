@@ -27,6 +27,7 @@ HALF_DIAGONAL = 0.75  # of a pixel, with something to spare
 WIDER, SPARE = 1.02, 0.01  # how much wider than rods strips around them are, times and in pixels
 MOST_STRIP = 0.5  # of a pixel
 LEAST_AWAY = 0.02  # pixels beside a chord at which it is checked
+OF_CENTRE = 0.43  # weight of the centre of a cell, with which cells err least of edges of all angles
 LIKE = 0.4  # the same among the pixels around one
 MOST_GROUPS = 3  # of surfaces and colours around a pixel that is looked at as a cell
 
@@ -430,7 +431,8 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
     """Decide what becomes of each cell; ``sums`` are the light of those done.
 
     ``groups`` are the corners, as bits, in the second group of a cell to cut. ``steps`` are those of cells not done.
-    Pixels beyond a side that an edge crosses are ``wanted``.
+    Pixels beyond a side that an edge crosses are ``wanted``. The ``sums`` of any other cell are the estimate that errs
+    least at an edge.
     """
     height, width = lens.shape
     q, light = points.code, points.light
@@ -453,6 +455,9 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
                 mean = 0.25 * (float(light[p0, c]) + float(light[p1, c]) + float(light[p2, c]) + float(light[p3, c]))
                 sums[pixel, c] = (mean + 2.0 * light[pixel, c]) / 3.0
             continue
+        for c in range(3):
+            four = float(light[p0, c]) + float(light[p1, c]) + float(light[p2, c]) + float(light[p3, c])
+            sums[pixel, c] = (1.0 - OF_CENTRE) / 4.0 * four + OF_CENTRE * light[pixel, c]
         first, second = p0, p0
         if surfaces:  # the two colours farthest apart
             far = np.float32(0)
