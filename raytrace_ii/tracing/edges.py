@@ -28,6 +28,7 @@ from .kernels import cells as kernels
 from .kernels.cells import CUT, DONE, MISSED, OPEN, UNITS, Places, Points, Sides
 from .kernels.sampling import lobe_keys
 from .kernels.sampling import places as set_places
+from .packing import packed
 from .sample_places import fixed_places
 from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
@@ -47,14 +48,13 @@ EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per rou
 AS_MANY = 2.9  # samples of a set that err as much as corners and centre of a cell
 FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
 DONE_ERROR, CUT_ERROR = 0.5, 0.9  # of cells, in parts of the error wanted
-FOLLOWED, OF_THIN = 64, 16  # how far a thin body is followed, in pixels, and samples to find it
+FOLLOWED, OF_THIN = 64, (4, 16)  # how far a thin body is followed, in pixels, least and most samples to find it
 WHITE = 255.0  # code
 SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 5 ns a pixel each
 THIN = 0.75  # pixels across a body, wider ones cover centres and corners all along
-OF_SMALL = 16, 64  # least and most samples where a small or thin body may be
-IN_STRIP, OF_STRIP = 2, (4, 64)  # how much fewer in a strip around it, which has little of the pixel
+OF_SMALL = 6, 64  # least and most samples where a small or thin body may be
+IN_STRIP, OF_STRIP = 2, (3, 64)  # how much fewer in a strip around it, which has little of the pixel
 SHIFTS = 0.7549, 0.5698  # multiples of them share a square out evenly
-OF_ROD = 500  # vertices that tell the longest axis of a body
 OF_BOX = 1000  # pixels that tell where the content is
 FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
 FINEST = 4096  # places in a pixel along each side that have keys of their own
@@ -135,14 +135,15 @@ class Cells:
         doubtful = steps > 0
         if len(self.sight.rods):
             opened[self._small(inside)] = True
-        left, thin = [], np.zeros(many, np.bool_)
+        left, thin, near = [], np.zeros(many, np.bool_), np.empty(many, np.float32)
+        kernels.nearest_around(reach, self.lens, near)
         corner_of = np.full((many, 4), -1, np.int32)
         for _ in range(ROUNDS):
             pixels = np.flatnonzero(doubtful & ~opened & self.own)
             if not len(pixels):
                 break
             opened[pixels] = True
-            left.append(self._open(self._near_together(pixels, reach), corner_of, doubtful, rough, thin))
+            left.append(self._open(self._near_together(pixels, near), corner_of, doubtful, rough, thin))
         self._share_out(np.concatenate(left or [inside[:0]]), rough)
         self._follow(thin, opened)
         return opened
@@ -239,14 +240,12 @@ class Cells:
             )  # fmt: skip
             kernels.add_shares(light, shares, pixels[some], self.sums)
 
-    def _near_together(self, pixels: NDArray[np.int64], reach: NDArray[np.float32]) -> NDArray[np.int64]:
+    def _near_together(self, pixels: NDArray[np.int64], near: NDArray[np.float32]) -> NDArray[np.int64]:
         """Return pixels in an order in which the edges that they see are close to each other in the scene.
 
         Rays and shadow rays of one packet then meet the same things: they take 311 instead of 436 ns (*Apples*,
         `setup1` at scale 4, 2026-11-25). An edge belongs to the nearest body around the pixel.
         """
-        near = np.empty(self.lens.size, np.float32)
-        kernels.nearest_around(reach, self.lens, near)
         L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
         far = near[pixels]
         known = np.isfinite(far)
@@ -265,8 +264,13 @@ class Cells:
     ) -> NDArray[np.int64]:  # fmt: skip
         """Find the light of pixels as cells between their corners; return those that are none."""
         count = len(pixels)
-        corners, places = np.empty((count, 4), np.int32), _places(4 * count)
-        new = kernels.open_pixels(pixels, self.lens, corner_of, self._count, corners, places)
+        corners, places, known = np.empty((count, 4), np.int32), _places(4 * count), _places(4 * count)
+        self._make_room(4 * count)
+        first = self._count
+        alike, new = kernels.open_pixels(
+            pixels, self.lens, corner_of, self.points, LOOSE * self.wanted.error, first, corners, places, known
+        )  # fmt: skip
+        self._count += alike
         self._look(_part(places, slice(new)))
         verdict, groups, steps = np.empty(count, np.int8), np.zeros(count, np.int8), np.zeros(count, np.float32)
         kernels.judge(
@@ -278,19 +282,39 @@ class Cells:
         if len(cut):
             verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])
         self.verdicts[pixels] = verdict
+        kernels.corners_of_open(corners, verdict, first, unsure := np.zeros(alike, np.bool_))
+        self._look_again(first + np.flatnonzero(unsure), _part(known, np.flatnonzero(unsure)), wanted)
         left = verdict == OPEN
         rough[pixels[left]] = steps[left] ** 2 / 3
         return pixels[left]
 
+    def _look_again(self, rows: NDArray[np.int64], places: Places, wanted: NDArray[np.bool_]) -> None:
+        """Look at corners that have only the mean of the centres around; pixels are wanted where a body is in between.
+
+        Thin bodies go on from open cells to pixels whose centres show nothing of them.
+        """
+        if not len(rows):
+            return
+        first = self._look(places, self.sight.tracer.sees_bodies)
+        other = np.flatnonzero(self.points.body[first : self._count] != self.points.body[rows])
+        self._count = first
+        if len(other):
+            first = self._look(_part(places, other))
+            for array in self.points:
+                array[rows[other]] = array[first : self._count]
+            self._count = first
+            kernels.mark_around(_part(places, other), self.lens, wanted)
+
     def _follow(self, thin: NDArray[np.bool_], opened: NDArray[np.bool_]) -> None:
         """Find the light of pixels in which a thin body may go on that was met nearby, as far as it does."""
         calm = self.own & (self.verdicts != OPEN)
-        pixels = np.flatnonzero(thin & calm)
+        pixels, number = np.flatnonzero(thin & calm), (MISSED * WHITE / 2 / self.wanted.error) ** (4 / 3)
+        number = int(SETS[np.searchsorted(SETS, np.clip(number, *OF_THIN))])
         for _ in range(FOLLOWED):
             if not len(pixels):
                 break
             calm[pixels], opened[pixels], thin[:] = False, True, False
-            self._sample(pixels, np.full(len(pixels), OF_THIN))
+            self._sample(pixels, np.full(len(pixels), number))
             light = self.sums[pixels].astype(np.float32)
             kernels.encode(light, self.curve, codes := np.empty_like(light))
             kernels.follow(pixels, codes, self.points, LOOSE * self.wanted.error, self.lens, thin)
@@ -329,9 +353,8 @@ class Cells:
     def _look(self, places: Places, bodies: bool = False, finer: float = FINER) -> int:
         """Look at places; return the row of the first of their points, of which ``bodies`` alone may be wanted."""
         first, n, s = self._count, len(places.pixel), self.sight
+        self._make_room(n)
         self._count += n
-        if len(self.points.body) < self._count:
-            self.points = _grown(self.points, first, 2 * self._count)
         points = _part(self.points, slice(first, self._count))
         kernels.count_rays(places.pixel, self.rays)
         for start in range(0, n, s.batch):
@@ -340,6 +363,10 @@ class Cells:
         if not bodies:
             kernels.encode(points.light, self.curve, points.code)
         return first
+
+    def _make_room(self, more: int) -> None:
+        if len(self.points.body) < self._count + more:
+            self.points = _grown(self.points, self._count, 2 * (self._count + more))
 
     def _trace(self, places: Places, points: Points, bodies: bool, finer: float) -> None:
         s, m, n = self.sight, self.m[places.pixel], self.n[places.pixel]
@@ -448,7 +475,7 @@ def small_rods(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats
 
     They are ends in the camera's frame, and radii.
     """
-    rods = np.array([_rod(np.asarray(body.vertices, np.float64)) for body in scene.bodies]).reshape(-1, 7)
+    rods = packed(scene).rods
     ends = (rods[:, :6].reshape(-1, 2, 3) - pose[:3, 3]) @ pose[:3, :3]
     width, spread = pixel
     far = np.linalg.norm(ends, axis=2).min(axis=1)
@@ -456,19 +483,6 @@ def small_rods(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     small = (across < THIN * pixels) | (np.maximum(across, length) < SMALL * pixels)
     return np.column_stack([ends.reshape(-1, 6), rods[:, 6]])[small][:MOST_SMALL]
-
-
-def _rod(vertices: Floats) -> Floats:
-    """Return the ends of the longest axis of a body, and the greatest distance from it."""
-    some = vertices[:: -(-len(vertices) // OF_ROD)]
-    middle = some.mean(axis=0)
-    axis = np.linalg.svd(some - middle, full_matrices=False)[2][0]
-    for points in (some, vertices):  # most bodies are seen to be thick by some of their vertices
-        along = (points - middle) @ axis
-        radius = np.sqrt(np.square(points - middle - along[:, None] * axis).sum(axis=1).max())
-        if radius > np.ptp(along) / 4:
-            break
-    return np.array([*(middle + along.min() * axis), *(middle + along.max() * axis), radius])
 
 
 def dense_mean(

@@ -376,36 +376,69 @@ def _right_down(corner):
 
 
 @kernel
-def open_pixels(pixels, lens, corner_of, next_point, corners, places):
+def open_pixels(pixels, lens, corner_of, points, error, next_point, corners, places, known_places):
     """Give pixels their corners, which pixels under one lens share.
 
     ``corner_of`` (pixels, 4) are the points at corners, in the row of the first pixel of those that share them; −1
-    where there is none yet. New points, from ``next_point`` on, have ``places``.
+    where there is none yet. A corner between four pixels whose centres look alike within ``error`` has their mean:
+    such points stand from ``next_point`` on, at ``known_places``. Those after them have ``places`` to look at.
 
     Returns
     -------
-    int
-        How many points are new.
+    alike, new : int
+        How many points of either kind there are.
     """
     height, width = lens.shape
-    new = 0
-    for i in range(pixels.shape[0]):
-        pixel = pixels[i]
-        y, x = pixel // width, pixel % width
-        for k in range(4):
-            right, down = _right_down(k)
-            owner, slot, found = pixel, k, False
-            for other in range(4):
-                b, a = y + down - 1 + other // 2, x + right - 1 + other % 2
-                if not found and 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
-                    owner, r, d, found = b * width + a, x + right - a, y + down - b, True
-                    slot = 3 - r if d == 1 else r
-            if corner_of[owner, slot] < 0:
-                corner_of[owner, slot] = next_point + new
-                places.pixel[new], places.x[new], places.y[new] = pixel, right * UNITS, down * UNITS
-                new += 1
-            corners[i, k] = corner_of[owner, slot]
-    return new
+    made, alike = 0, 0
+    for looked in range(2):
+        for i in range(pixels.shape[0]):
+            pixel = pixels[i]
+            y, x = pixel // width, pixel % width
+            for k in range(4):
+                right, down = _right_down(k)
+                top, left = y + down - 1, x + right - 1
+                owner, slot, found = pixel, k, 0
+                for other in range(3, -1, -1):
+                    b, a = top + other // 2, left + other % 2
+                    if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
+                        owner, found = b * width + a, found + 1
+                        slot = (0 if a > left else 1) if b > top else (3 if a > left else 2)
+                if corner_of[owner, slot] < 0:
+                    known = found == 4 and _four_alike(points, top * width + left, width, error)
+                    if looked == 0 and known:
+                        _mean_point(points, top * width + left, width, next_point + made)
+                    if looked == 0 and not known:
+                        continue
+                    corner_of[owner, slot] = next_point + made
+                    at, row = (places, made - alike) if looked else (known_places, made)
+                    at.pixel[row], at.x[row], at.y[row] = pixel, right * UNITS, down * UNITS
+                    made += 1
+                corners[i, k] = corner_of[owner, slot]
+        alike = made if looked == 0 else alike
+    return alike, made - alike
+
+
+@inline_kernel
+def _four_alike(points, first, width, error):
+    """Whether four centres around a corner are on one surface and of one colour."""
+    good = True
+    for other in range(1, 4):
+        j = first + other % 2 + other // 2 * width
+        good &= _one_surface(points, first, j)
+        for before in range(other):
+            good &= _apart(points, j, first + before % 2 + before // 2 * width) * MISSED <= error
+    return good
+
+
+@inline_kernel
+def _mean_point(points, first, width, row):
+    points.body[row] = points.body[first]
+    for c in range(3):
+        points.normal[row, c], light, code = points.normal[first, c], np.float32(0), np.float32(0)
+        for other in range(4):
+            j = first + other % 2 + other // 2 * width
+            light, code = light + points.light[j, c], code + points.code[j, c]
+        points.light[row, c], points.code[row, c] = light * np.float32(0.25), code * np.float32(0.25)
 
 
 @inline_kernel
@@ -497,6 +530,25 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
 @inline_kernel
 def _differs(points, i, j, error):
     return points.body[i] != points.body[j] and _apart(points, i, j) * MISSED > error
+
+
+@kernel
+def corners_of_open(corners, verdict, first, wanted):
+    """Tell which points, from ``first`` on, are corners of cells that stay open."""
+    for i in range(corners.shape[0]):
+        for k in range(4):
+            if verdict[i] == OPEN and 0 <= corners[i, k] - first < wanted.shape[0]:
+                wanted[corners[i, k] - first] = True
+
+
+@kernel
+def mark_around(places, lens, wanted):
+    """Mark the pixels around corners."""
+    width = lens.shape[1]
+    for i in range(places.pixel.shape[0]):
+        y, x = places.pixel[i] // width, places.pixel[i] % width
+        down, right = int(places.y[i] > 0), int(places.x[i] > 0)
+        _mark(lens, y + down - 1, y + down, x + right - 1, x + right, lens[y, x], wanted)
 
 
 @kernel
