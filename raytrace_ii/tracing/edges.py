@@ -30,7 +30,7 @@ from .kernels.sampling import lobe_keys
 from .kernels.sampling import places as set_places
 from .packing import packed
 from .sample_places import fixed_places
-from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
+from .sampling import Edges, EvenRays, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
 
 ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
@@ -41,7 +41,7 @@ DENSE = 0.3  # share of the pixels, around which much meets, from which on no ed
 BLOCK, BLOCKS, FEW = 16, 16, 4096  # pixels along a block, one of how many tells of a tile, pixels that all do
 LOOSE = 2.0  # how much more than the error wanted of all pixels may be hidden in one
 SPREAD, SPREAD_ERROR = 0.3, 0.75  # powers of the roughness by which samples of a pixel and their error grow
-PILOTS, OF_PILOTS = 768, (4, 9)  # pixels of a tile that get two sets, which tell of the error
+PILOTS, OF_PILOTS = 400, (4, 9)  # pixels of a tile that get two sets, which tell of the error
 PILOTS_FILTER = 0.6  # times the width of a set's filter: what that errs alike in all sets scatters
 ALIKE = 0.8  # square of the difference of both in parts of the sum of the squares of their errors
 EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per roughness; powers of n by which it falls
@@ -74,6 +74,7 @@ class Sight:
     """
 
     camera: IICamera
+    rays: IICamera | EvenRays
     tracer: Tracer
     seed: int
     batch: int
@@ -203,7 +204,7 @@ class Cells:
     def _touched(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
         """Return which pixels small bodies may be seen in, and strips (n, 6) that have them, see `kernels.strips`."""
         one = np.empty(len(pixels), np.int32)
-        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
+        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels])
         kernels.touched(L, D, self.sight.rods, *self.sight.pixel, one)
         which = np.flatnonzero(one != -1)
         one, (L, D) = one[which], self._unit_rays(pixels[which], 0.5, 0.5)
@@ -214,7 +215,7 @@ class Cells:
 
     def _unit_rays(self, pixels: NDArray[np.int64], x: float, y: float) -> tuple[Floats, Floats]:
         within = np.broadcast_to(np.array([x, y]), (len(pixels), 2))
-        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels], within)
+        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels], within)
         length = np.linalg.norm(D, axis=-1, keepdims=True)
         return L, np.divide(D, length, out=D, where=length > 0)
 
@@ -233,7 +234,7 @@ class Cells:
             # a body stands in its strip in the same place in all pixels
             twice[:, :number] = (twice[:, :number] + np.outer(m + 1.6 * n, SHIFTS)[:, None]) % 1.0
             kernels.strip_places(strip[some], twice, shares := np.empty(twice.shape[:2]))
-            L, D, weights = s.camera.weighted_rays_at(m[:, None], n[:, None], twice)
+            L, D, weights = s.rays.weighted_rays_at(m[:, None], n[:, None], twice)
             light = s.shoot(
                 L.reshape(-1, 3), D.reshape(-1, 3), None if weights is None else weights.reshape(-1),
                 numbers=(m, n, 0, count), first=None, traced=np.empty(0, np.int32),
@@ -246,7 +247,7 @@ class Cells:
         Rays and shadow rays of one packet then meet the same things: they take 311 instead of 436 ns (*Apples*,
         `setup1` at scale 4, 2026-11-25). An edge belongs to the nearest body around the pixel.
         """
-        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
+        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels])
         far = near[pixels]
         known = np.isfinite(far)
         far[~known] = np.median(far[known]) if known.any() else 1.0
@@ -372,7 +373,7 @@ class Cells:
         s, m, n = self.sight, self.m[places.pixel], self.n[places.pixel]
         s.check()
         within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
-        rays = s.camera.weighted_rays_at(m, n, within)
+        rays = s.rays.weighted_rays_at(m, n, within)
         if bodies:
             points.body[:] = s.tracer.bodies(*rays)
             return
@@ -447,7 +448,7 @@ class Cells:
         s = self.sight
         s.tracer.footprint = s.width[0] * wide / number**0.5, s.width[1] * wide / number**0.5
         s.tracer.lobes = -(-LOBE_RAYS // number), number
-        light = fixed_sum(s.camera, number, s.seed + seed, self.m[pixels], self.n[pixels], s.batch, s.parts, s.shoot)
+        light = fixed_sum(s.rays, number, s.seed + seed, self.m[pixels], self.n[pixels], s.batch, s.parts, s.shoot)
         self.rays[pixels] += number
         return light / number
 

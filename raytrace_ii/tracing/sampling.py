@@ -106,6 +106,53 @@ def number_of_samples(wanted: Sampling) -> tuple[int, int]:
     return (wanted, wanted) if isinstance(wanted, int) else (1, 1)
 
 
+@dataclass(frozen=True)
+class EvenRays:
+    """Rays of a camera whose coordinates grow evenly within a pixel: those of a pinhole. They take a sixth of the time.
+
+    Fields are those of `kernels.sampling.even_rays`.
+    """
+
+    pixels: tuple[int, int]
+    columns: Floats
+    rows: Floats
+    z: Floats
+    steps: Floats
+    samples_aperture: bool = False
+
+    @classmethod
+    def of(cls, camera: IICamera) -> EvenRays | None:
+        """Return the rays of a camera; None if they are not even."""
+        centres = camera.separable_rays()
+        if centres is None or camera.samples_aperture:
+            return None
+        steps = np.empty((2, 2))
+        for axis, centre in enumerate(centres[:2]):
+            along, across = np.arange(len(centre)), np.zeros(len(centre), np.int64)
+            ends = []
+            for end in (0.0, 1.0):
+                place = (end, 0.5) if axis == 0 else (0.5, end)
+                pair = camera.weighted_rays_at(*((along, across) if axis == 0 else (across, along)), place)[:2]
+                ends.append(np.stack([of[:, axis] for of in pair], axis=1))
+            steps[axis] = (ends[1] - ends[0])[0]
+            for side, end in zip((-0.5, 0.5), ends, strict=True):
+                if not np.allclose(end, centre + side * steps[axis], rtol=1e-12, atol=1e-12 * np.abs(centre).max()):
+                    return None
+        return cls(camera.pixels, *(np.ascontiguousarray(of) for of in centres), steps)
+
+    def weighted_rays_at(
+        self, m: Any, n: Any, sample: Any = (0.5, 0.5), *_: Any
+    ) -> tuple[Floats, Floats, Floats | None]:  # fmt: skip
+        """As `IICamera.weighted_rays_at`, for samples (p, 2) or (p, count, 2) of pixels (p,) or (p, 1)."""
+        m, n = np.asarray(m).reshape(-1), np.asarray(n).reshape(-1)
+        within = np.asarray(sample, np.float64)
+        shape = np.broadcast_shapes(within.shape, (len(m), 2)) if within.ndim < 3 else within.shape
+        within = np.ascontiguousarray(np.broadcast_to(within, shape).reshape(len(m), -1, 2))
+        L, D = np.empty((within.size // 2, 3)), np.empty((within.size // 2, 3))
+        sample_kernels.even_rays(m, n, within, self.columns, self.rows, self.z, self.steps, L, D)
+        return L.reshape(*shape[:-1], 3), D.reshape(*shape[:-1], 3), None
+
+
 class Shoot(Protocol):
     """Traces rays of a camera; ``first`` says that these begin their pixels.
 
@@ -124,7 +171,7 @@ Parts = Callable[[int], tuple[int, int]]
 
 
 def fixed_sum(
-    camera: IICamera, samples: int, seed: int, m: NDArray[Any], n: NDArray[Any], batch: int, parts: Parts,
+    camera: IICamera | EvenRays, samples: int, seed: int, m: NDArray[Any], n: NDArray[Any], batch: int, parts: Parts,
     shoot: Shoot,
 ) -> Radiance:  # fmt: skip
     """Return the summed radiance (p, 3) of pixels in columns m and rows n, all with the same number of samples.
@@ -236,7 +283,7 @@ def needed(lens: NDArray[np.int64], own: NDArray[np.bool_]) -> NDArray[np.bool_]
 
 
 def _rays(
-    camera: IICamera,
+    camera: IICamera | EvenRays,
     seed: int,
     table: Floats,
     m: NDArray[Any],

@@ -389,33 +389,39 @@ def open_pixels(pixels, lens, corner_of, points, error, next_point, corners, pla
         How many points of either kind there are.
     """
     height, width = lens.shape
-    made, alike = 0, 0
-    for looked in range(2):
-        for i in range(pixels.shape[0]):
-            pixel = pixels[i]
-            y, x = pixel // width, pixel % width
-            for k in range(4):
-                right, down = _right_down(k)
-                top, left = y + down - 1, x + right - 1
-                owner, slot, found = pixel, k, 0
-                for other in range(3, -1, -1):
-                    b, a = top + other // 2, left + other % 2
-                    if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
-                        owner, found = b * width + a, found + 1
-                        slot = (0 if a > left else 1) if b > top else (3 if a > left else 2)
+    alike = 0
+    for i in range(pixels.shape[0]):
+        pixel = pixels[i]
+        y, x = pixel // width, pixel % width
+        for k in range(4):
+            right, down = _right_down(k)
+            top, left = y + down - 1, x + right - 1
+            owner, slot, found = pixel, k, 0
+            for other in range(3, -1, -1):
+                b, a = top + other // 2, left + other % 2
+                if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
+                    owner, found = b * width + a, found + 1
+                    slot = (0 if a > left else 1) if b > top else (3 if a > left else 2)
+            if corner_of[owner, slot] < 0 and found == 4 and _four_alike(points, top * width + left, width, error):
+                _mean_point(points, top * width + left, width, next_point + alike)
+                corner_of[owner, slot] = next_point + alike
+                at = known_places
+                at.pixel[alike], at.x[alike], at.y[alike] = pixel, right * UNITS, down * UNITS
+                alike += 1
+            known = corner_of[owner, slot]
+            corners[i, k] = known if known >= 0 else -2 - 4 * owner - slot  # to be looked at
+    new = 0
+    for i in range(pixels.shape[0]):
+        for k in range(4):
+            if corners[i, k] < 0:
+                owner, slot = (-2 - corners[i, k]) // 4, (-2 - corners[i, k]) % 4
                 if corner_of[owner, slot] < 0:
-                    known = found == 4 and _four_alike(points, top * width + left, width, error)
-                    if looked == 0 and known:
-                        _mean_point(points, top * width + left, width, next_point + made)
-                    if looked == 0 and not known:
-                        continue
-                    corner_of[owner, slot] = next_point + made
-                    at, row = (places, made - alike) if looked else (known_places, made)
-                    at.pixel[row], at.x[row], at.y[row] = pixel, right * UNITS, down * UNITS
-                    made += 1
+                    right, down = _right_down(k)
+                    corner_of[owner, slot] = next_point + alike + new
+                    places.pixel[new], places.x[new], places.y[new] = pixels[i], right * UNITS, down * UNITS
+                    new += 1
                 corners[i, k] = corner_of[owner, slot]
-        alike = made if looked == 0 else alike
-    return alike, made - alike
+    return alike, new
 
 
 @inline_kernel
