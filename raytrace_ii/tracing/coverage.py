@@ -56,9 +56,9 @@ class Coverage(Cells):
         kernels.encode(self.points.light[: self.lens.size], self.curve, self.points.code)
         corners, places = np.empty((count, 4), np.int32), _places(4 * count)
         corner_of = np.full((self.lens.size, 4), -1, np.int32)
-        never, no_places = -1.0, _places(0)
+        plain, never, no_places = self.sight.tracer.scene.plain, -1.0, _places(0)
         _, new = kernels.open_pixels(
-            pixels, self.lens, corner_of, self.points, never, self._count, corners, places, no_places
+            pixels, self.lens, corner_of, self.points, plain, never, self._count, corners, places, no_places
         )  # fmt: skip
         self._look(_part(places, slice(new)))
         verdict, groups = np.empty(count, np.int8), np.zeros(count, np.int8)

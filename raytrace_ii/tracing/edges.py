@@ -269,7 +269,8 @@ class Cells:
         self._make_room(4 * count)
         first = self._count
         alike, new = kernels.open_pixels(
-            pixels, self.lens, corner_of, self.points, LOOSE * self.wanted.error, first, corners, places, known
+            pixels, self.lens, corner_of, self.points, self.sight.tracer.scene.plain, LOOSE * self.wanted.error,
+            first, corners, places, known,
         )  # fmt: skip
         self._count += alike
         self._look(_part(places, slice(new)))
@@ -396,6 +397,7 @@ class Cells:
         weights, error = np.maximum(rough[pixels], 1.0).astype(np.float64), self.wanted.error
         pilots = slice((every := max(len(pixels) // PILOTS, 4)) // 2, None, every)
         cells = self.sums[pixels]
+        estimated = np.isfinite(cells[:, 0])
         edges, noise = self._pilot(pixels[pilots], float(np.mean(weights[pilots])))
         eighths, which, times = np.unique(
             np.rint(8 * np.log2(weights)).astype(np.int64), return_inverse=True, return_counts=True
@@ -405,7 +407,7 @@ class Cells:
         expected = weights**SPREAD_ERROR / np.average(weights**SPREAD_ERROR, weights=times)
         least = (EDGE * weights / (FAR * error) ** 2) ** (1 / EDGES_FALL)
         squares = error**2 * (len(pixels) + done * (1 - DONE_ERROR**2) + cut * (1 - CUT_ERROR**2))
-        of_sets = (1 - _of_cell(SETS)) * (edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS)
+        of_sets = (1 - estimated.mean() * _of_cell(SETS)) * (edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS)
         low, high = -10.0, 10.0
         for _ in range(30):
             middle = (low + high) / 2
@@ -418,8 +420,9 @@ class Cells:
         todo[pilots] = numbers[pilots] > sum(OF_PILOTS)
         numbers[~todo] = sum(OF_PILOTS)
         self._sample(pixels[todo], numbers[todo])
-        shares = _of_cell(numbers)[:, None]
-        self.sums[pixels] = shares * cells + (1 - shares) * self.sums[pixels]
+        shares = _of_cell(numbers[estimated])[:, None]
+        self.sums[pixels[estimated]] *= 1 - shares
+        self.sums[pixels[estimated]] += shares * cells[estimated]
 
     def _pilot(self, some: NDArray[np.int64], rough: float) -> tuple[float, float]:
         """Return the mean square errors, in codes, of a sample: of edges and of noise.

@@ -116,6 +116,11 @@ class PackedScene:
         self.surroundings = Surroundings(self.lights, self.background, self.fog, self.ambient)
 
     @cached_property
+    def plain(self) -> NDArray[np.bool_]:
+        """Bodies (b + 1,) without textures, last the sky."""
+        return np.append(self.materials[:, tables.EXTRAS] == 0, self.background[tables.SKY_IMAGE] < 0)
+
+    @cached_property
     def rods(self) -> NDArray[np.float64]:
         """Rods (b, 7) around the bodies: the ends of the longest axis, and the greatest distance from it."""
         return np.array([_rod(np.asarray(vertices, np.float64)) for vertices in self._vertices]).reshape(-1, 7)

@@ -376,12 +376,12 @@ def _right_down(corner):
 
 
 @kernel
-def open_pixels(pixels, lens, corner_of, points, error, next_point, corners, places, known_places):
+def open_pixels(pixels, lens, corner_of, points, plain, error, next_point, corners, places, known_places):
     """Give pixels their corners, which pixels under one lens share.
 
     ``corner_of`` (pixels, 4) are the points at corners, in the row of the first pixel of those that share them; −1
-    where there is none yet. A corner between four pixels whose centres look alike within ``error`` has their mean:
-    such points stand from ``next_point`` on, at ``known_places``. Those after them have ``places`` to look at.
+    where there is none yet. A corner between four pixels whose centres look alike within ``error``, on a body that is
+    ``plain``, has their mean: such points stand from ``next_point`` on, at ``known_places``. Those after them have ``places`` to look at.
 
     Returns
     -------
@@ -402,7 +402,8 @@ def open_pixels(pixels, lens, corner_of, points, error, next_point, corners, pla
                 if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
                     owner, found = b * width + a, found + 1
                     slot = (0 if a > left else 1) if b > top else (3 if a > left else 2)
-            if corner_of[owner, slot] < 0 and found == 4 and _four_alike(points, top * width + left, width, error):
+            alone = found == 4 and corner_of[owner, slot] < 0 and plain[points.body[pixel]]
+            if alone and _four_alike(points, top * width + left, width, error):
                 _mean_point(points, top * width + left, width, next_point + alike)
                 corner_of[owner, slot] = next_point + alike
                 at = known_places
@@ -471,7 +472,7 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
 
     ``groups`` are the corners, as bits, in the second group of a cell to cut. ``steps`` are those of cells not done.
     Pixels beyond a side that an edge crosses are ``wanted``. The ``sums`` of any other cell are the estimate that errs
-    least at an edge.
+    least at an edge, NaN on one surface, whose pattern may be in step with the pixels.
     """
     height, width = lens.shape
     q, light = points.code, points.light
@@ -496,7 +497,7 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
             continue
         for c in range(3):
             four = float(light[p0, c]) + float(light[p1, c]) + float(light[p2, c]) + float(light[p3, c])
-            sums[pixel, c] = (1.0 - OF_CENTRE) / 4.0 * four + OF_CENTRE * light[pixel, c]
+            sums[pixel, c] = math.nan if surfaces else (1.0 - OF_CENTRE) / 4.0 * four + OF_CENTRE * light[pixel, c]
         first, second = p0, p0
         if surfaces:  # the two colours farthest apart
             far = np.float32(0)
