@@ -14,6 +14,7 @@ import math
 import os
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -46,7 +47,7 @@ def main() -> None:
     asked = parser.parse_args()
     if asked.psnr:
         for key in RECORDS.todo([{"scene": name, "scale": asked.psnr} for name in asked.scenes], asked.again):
-            found = RECORDS.measure(key, lambda key=key: at_equal_psnr(**key))["result"]
+            found = RECORDS.measure(key, partial(at_equal_psnr, **key))["result"]
             print(key["scene"], {name: round(found[f"times {name}"], 2) for name in COMMITS[1:]}, flush=True)
     else:
         measure_bands(asked)
@@ -61,7 +62,7 @@ def main() -> None:
 def measure_bands(asked: Any) -> None:
     """Measure one sample at full size."""
     for key in RECORDS.todo([{"scene": name} for name in asked.scenes], asked.again):
-        found = RECORDS.measure(key, lambda key=key: compare(**key))["result"]
+        found = RECORDS.measure(key, partial(compare, **key))["result"]
         print(key["scene"], {name: round(value, 2) for name, value in found.items()}, flush=True)
 
 
@@ -87,16 +88,17 @@ def compare(scene: str) -> dict[str, float]:
 def at_equal_psnr(scene: str, scale: int) -> dict[str, Any]:
     """Return fronts of time and PSNR of all codes, and the ratios of their times at equal PSNR."""
     codes = {"now": ROOT, **{commit: worktree(commit) for commit in COMMITS[1:]}}
-    camera, found = json.dumps(band(preset("setup1", scale=scale)).to_json()), {name: {} for name in codes}
+    camera = json.dumps(band(preset("setup1", scale=scale)).to_json())
+    found: dict[str, dict[str, tuple[float, float]]] = {name: {} for name in codes}
     settings: list[dict[str, Any]] = [{"samples": number} for number in FIXED]
     settings += [{"samples": [4, 16], "error": error} for error in ADAPTIVE]
     settings += [{"samples": "edges", "error": error} for error in BY_EDGES]
     with ExitStack() as stack:
         shoot = {name: stack.enter_context(shots(code, scene, camera, [1.0])) for name, code in codes.items()}
-        for name, (render, facts) in shoot.items():
+        for render, facts in shoot.values():
             render(cut=1.0, depth=facts["max_depth"], repeats=1, options={"samples": 256, "seed": 1})
         for options in settings:
-            for turn in range(TURNS):
+            for _ in range(TURNS):
                 for name, (render, facts) in shoot.items():
                     if name == "now" or options["samples"] != "edges":
                         seconds, psnr = render(
@@ -106,8 +108,11 @@ def at_equal_psnr(scene: str, scale: int) -> dict[str, Any]:
                         found[name][str(options)] = min(best, (seconds, psnr))
     rows = {name: [{"seconds": s, "psnr": p} for s, p in each.values()] for name, each in found.items()}
     ratios = {f"times {name}": times_at_equal_psnr(rows[name], rows["now"]) for name in COMMITS[1:]}
-    return {**ratios, "fronts": {name: [each[i] for i in front(each)] for name, each in rows.items()},
-        "load": os.getloadavg()[0]}
+    return {
+        **ratios,
+        "fronts": {name: [each[i] for i in front(each)] for name, each in rows.items()},
+        "load": os.getloadavg()[0],
+    }
 
 
 def times_at_equal_psnr(earlier: Sequence[dict[str, Any]], now: Sequence[dict[str, Any]]) -> float:

@@ -37,7 +37,7 @@ ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not se
 # Numbers of samples of pixels that are no cells. Others above 16 miss more of an edge than these in turn.
 SETS = np.array([2, 3, 4, 6, 9, 12, 16, 32, 64, 128, 256])
 GOLDEN = (5**0.5 - 1) / 2  # multiples of it share pixels out evenly
-DENSE = 0.3  # share of the pixels, around which much meets, from which on no edges are looked for
+DENSE = 0.28  # share of the pixels, around which much meets, from which on no edges are looked for
 BLOCK, BLOCKS, FEW = 16, 16, 4096  # pixels along a block, one of how many tells of a tile, pixels that all do
 LOOSE = 2.0  # how much more than the error wanted of all pixels may be hidden in one
 SPREAD, SPREAD_ERROR = 0.3, 0.75  # powers of the roughness by which samples of a pixel and their error grow
@@ -291,7 +291,7 @@ class Cells:
         return pixels[left]
 
     def _look_again(self, rows: NDArray[np.int64], places: Places, wanted: NDArray[np.bool_]) -> None:
-        """Look at corners that have only the mean of the centres around; pixels are wanted where a body is in between.
+        """Look at corners that have the mean of the centres around; pixels are wanted where another body is in between.
 
         Thin bodies go on from open cells to pixels whose centres show nothing of them.
         """
@@ -341,14 +341,18 @@ class Cells:
                     kernels.narrow_sides(sides, which[part], first, self.points)
                     self._count = first  # they are not needed again
         shares, places, verdict = np.empty(many), _places(2 * many), np.empty(many, np.int8)
-        kernels.chords(pixels, corners, groups, of_cell, sides, self.points, error, verdict, shares, places)
+        beside = np.empty((many, 2), np.int32)
+        kernels.chords(pixels, corners, groups, of_cell, sides, self.points, error, verdict, shares, places, beside)
         sure = np.flatnonzero(verdict == CUT)
-        beside = self._look(_part(places, np.stack([2 * sure, 2 * sure + 1], axis=1).reshape(-1)))
+        rows = np.flatnonzero((beside < 0) & (verdict == CUT)[:, None])
+        first = self._look(_part(places, rows))
+        beside.reshape(-1)[rows] = np.arange(first, self._count)
         checked = verdict[sure]
         kernels.confirm(
-            pixels[sure], corners[sure], groups[sure], shares[sure], beside, self.points, error, checked, self.sums
-        )
-        self._count = beside
+            pixels[sure], corners[sure], groups[sure], shares[sure], beside[sure], self.points, error, checked,
+            self.sums,
+        )  # fmt: skip
+        self._count = first
         verdict[sure] = checked
         return verdict
 
@@ -523,7 +527,7 @@ def edge_mean(
     """
     m, n, lens = with_rim(sight.camera, rows, cols)
     own = ((n >= rows.start) & (n < rows.stop) & (m >= cols.start) & (m < cols.stop)).ravel()
-    rim = ~own & needed(lens, own)
+    rim = ~own if own.all() else ~own & needed(lens, own)
     lens = np.where((own | rim).reshape(lens.shape), lens, -1)
     cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, own)
     inside, points, reach = np.flatnonzero(own)[order], cells.points, np.full(lens.size, np.nan, np.float32)

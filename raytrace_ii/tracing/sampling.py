@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IICamera
 
@@ -108,9 +108,9 @@ def number_of_samples(wanted: Sampling) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class EvenRays:
-    """Rays of a camera whose coordinates grow evenly within a pixel: those of a pinhole. They take a sixth of the time.
+    """Rays of a camera whose coordinates grow evenly within a pixel, as those of pinholes do.
 
-    Fields are those of `kernels.sampling.even_rays`.
+    The other fields are those of `kernels.sampling.even_rays`, which takes a sixth of the time of a camera.
     """
 
     pixels: tuple[int, int]
@@ -129,28 +129,29 @@ class EvenRays:
         steps = np.empty((2, 2))
         for axis, centre in enumerate(centres[:2]):
             along, across = np.arange(len(centre)), np.zeros(len(centre), np.int64)
-            ends = []
-            for end in (0.0, 1.0):
-                place = (end, 0.5) if axis == 0 else (0.5, end)
-                pair = camera.weighted_rays_at(*((along, across) if axis == 0 else (across, along)), place)[:2]
-                ends.append(np.stack([of[:, axis] for of in pair], axis=1))
-            steps[axis] = (ends[1] - ends[0])[0]
-            for side, end in zip((-0.5, 0.5), ends, strict=True):
-                if not np.allclose(end, centre + side * steps[axis], rtol=1e-12, atol=1e-12 * np.abs(centre).max()):
+            m, n = (along, across) if axis == 0 else (across, along)
+            low, high = (
+                np.stack([of[:, axis] for of in camera.weighted_rays_at(m, n, place)[:2]], axis=1)
+                for place in (((0.0, 0.5), (1.0, 0.5)) if axis == 0 else ((0.5, 0.0), (0.5, 1.0)))
+            )
+            steps[axis] = (high - low)[0]
+            slack = 1e-12 * np.abs(centre).max()
+            for far, end in ((-0.5, low), (0.5, high)):
+                if not np.allclose(end, centre + far * steps[axis], rtol=1e-12, atol=slack):
                     return None
-        return cls(camera.pixels, *(np.ascontiguousarray(of) for of in centres), steps)
+        columns, rows, z = (np.ascontiguousarray(of) for of in centres)
+        return cls(camera.pixels, columns, rows, z, steps)
 
     def weighted_rays_at(
-        self, m: Any, n: Any, sample: Any = (0.5, 0.5), *_: Any
-    ) -> tuple[Floats, Floats, Floats | None]:  # fmt: skip
+        self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), *_: ArrayLike
+    ) -> tuple[Floats, Floats, Floats | None]:
         """As `IICamera.weighted_rays_at`, for samples (p, 2) or (p, count, 2) of pixels (p,) or (p, 1)."""
-        m, n = np.asarray(m).reshape(-1), np.asarray(n).reshape(-1)
-        within = np.asarray(sample, np.float64)
-        shape = np.broadcast_shapes(within.shape, (len(m), 2)) if within.ndim < 3 else within.shape
-        within = np.ascontiguousarray(np.broadcast_to(within, shape).reshape(len(m), -1, 2))
+        m, n, within = np.asarray(m).reshape(-1), np.asarray(n).reshape(-1), np.asarray(sample, np.float64)
+        within = np.broadcast_to(within, (len(m), 2)) if within.ndim < 3 else within
+        shape, flat = (*within.shape[:-1], 3), np.ascontiguousarray(within.reshape(len(m), -1, 2))
         L, D = np.empty((within.size // 2, 3)), np.empty((within.size // 2, 3))
-        sample_kernels.even_rays(m, n, within, self.columns, self.rows, self.z, self.steps, L, D)
-        return L.reshape(*shape[:-1], 3), D.reshape(*shape[:-1], 3), None
+        sample_kernels.even_rays(m, n, flat, self.columns, self.rows, self.z, self.steps, L, D)
+        return L.reshape(shape), D.reshape(shape), None
 
 
 class Shoot(Protocol):

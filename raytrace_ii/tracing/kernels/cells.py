@@ -381,7 +381,8 @@ def open_pixels(pixels, lens, corner_of, points, plain, error, next_point, corne
 
     ``corner_of`` (pixels, 4) are the points at corners, in the row of the first pixel of those that share them; −1
     where there is none yet. A corner between four pixels whose centres look alike within ``error``, on a body that is
-    ``plain``, has their mean: such points stand from ``next_point`` on, at ``known_places``. Those after them have ``places`` to look at.
+    ``plain``, has their mean: such points stand from ``next_point`` on, at ``known_places``. Those after them have
+    ``places`` to look at.
 
     Returns
     -------
@@ -471,7 +472,7 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
     """Decide what becomes of each cell; ``sums`` are the light of those done.
 
     ``groups`` are the corners, as bits, in the second group of a cell to cut. ``steps`` are those of cells not done.
-    Pixels beyond a side that an edge crosses are ``wanted``. The ``sums`` of any other cell are the estimate that errs
+    Pixels beyond a side that an edge crosses are ``wanted``. The ``sums`` of other cells are the estimate that errs
     least at an edge, NaN on one surface, whose pattern may be in step with the pixels.
     """
     height, width = lens.shape
@@ -699,10 +700,11 @@ def _ends_of_groups(points, corners, i, bits):
 
 
 @kernel
-def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shares, places):
+def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shares, places, beside):
     """Cut cells by the chord between the crossings of their sides; two places beside its middle are to be looked at.
 
-    ``shares`` are the parts of the first groups. A cell is `OPEN` if a side is bad, or its centre is on the other
+    ``beside`` (n, 2) is the pixel, whose centre tells instead of a place, or −1. ``shares`` are the parts of the first
+    groups. A cell is `OPEN` if a side is bad, or its centre is on the other
     side than its group.
     """
     for i in range(pixels.shape[0]):
@@ -750,7 +752,9 @@ def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shar
             places.x[2 * i + k] = UNITS * min(max(mx + off * nx, 0.0), 1.0)
             places.y[2 * i + k] = UNITS * min(max(my + off * ny, 0.0), 1.0)
         across = (0.5 - mx) * nx + (0.5 - my) * ny
+        beside[i, 0], beside[i, 1] = -1, -1
         if abs(across) > away:
+            beside[i, 0 if (across > 0.0) == (far0 > 0.0) else 1] = pixels[i]
             surfaces = not _one_surface(points, first, second)
             expected = FIRST if (across > 0.0) == (far0 > 0.0) else SECOND
             bad |= _group(points, pixels[i], first, second, surfaces, step) != expected
@@ -759,10 +763,10 @@ def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shar
 
 @kernel
 def confirm(pixels, corners, groups, shares, beside, points, error, verdict, sums):
-    """Find the light of cells cut; `OPEN` those at whose places of `chords` points, from ``beside`` on, disagree."""
+    """Find the light of cells cut; `OPEN` those in which the points ``beside`` the chord disagree."""
     light = points.light
     for i in range(pixels.shape[0]):
-        bits, one, other = groups[i], beside + 2 * i, beside + 2 * i + 1
+        bits, one, other = groups[i], beside[i, 0], beside[i, 1]
         first, second, step = _ends_of_groups(points, corners, i, bits)
         surfaces = not _one_surface(points, first, second)
         good = _group(points, one, first, second, surfaces, step) == FIRST
