@@ -291,7 +291,7 @@ class Cells:
         return pixels[left]
 
     def _look_again(self, rows: NDArray[np.int64], places: Places, wanted: NDArray[np.bool_]) -> None:
-        """Look at corners that have the mean of the centres around; pixels are wanted where another body is in between.
+        """Look at corners that have the mean of four centres; pixels are wanted where another body is in between.
 
         Thin bodies go on from open cells to pixels whose centres show nothing of them.
         """

@@ -703,9 +703,8 @@ def _ends_of_groups(points, corners, i, bits):
 def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shares, places, beside):
     """Cut cells by the chord between the crossings of their sides; two places beside its middle are to be looked at.
 
-    ``beside`` (n, 2) is the pixel, whose centre tells instead of a place, or −1. ``shares`` are the parts of the first
-    groups. A cell is `OPEN` if a side is bad, or its centre is on the other
-    side than its group.
+    ``beside`` (n, 2) is the pixel where its centre tells instead of a place, or −1. ``shares`` are the parts of the
+    first groups. A cell is `OPEN` if a side is bad, or its centre is on the other side than its group.
     """
     for i in range(pixels.shape[0]):
         bits = groups[i]
