@@ -341,18 +341,14 @@ class Cells:
                     kernels.narrow_sides(sides, which[part], first, self.points)
                     self._count = first  # they are not needed again
         shares, places, verdict = np.empty(many), _places(2 * many), np.empty(many, np.int8)
-        beside = np.empty((many, 2), np.int32)
-        kernels.chords(pixels, corners, groups, of_cell, sides, self.points, error, verdict, shares, places, beside)
+        kernels.chords(pixels, corners, groups, of_cell, sides, self.points, error, verdict, shares, places)
         sure = np.flatnonzero(verdict == CUT)
-        rows = np.flatnonzero((beside < 0) & (verdict == CUT)[:, None])
-        first = self._look(_part(places, rows))
-        beside.reshape(-1)[rows] = np.arange(first, self._count)
+        beside = self._look(_part(places, np.stack([2 * sure, 2 * sure + 1], axis=1).reshape(-1)))
         checked = verdict[sure]
         kernels.confirm(
-            pixels[sure], corners[sure], groups[sure], shares[sure], beside[sure], self.points, error, checked,
-            self.sums,
-        )  # fmt: skip
-        self._count = first
+            pixels[sure], corners[sure], groups[sure], shares[sure], beside, self.points, error, checked, self.sums
+        )
+        self._count = beside
         verdict[sure] = checked
         return verdict
 

@@ -700,11 +700,11 @@ def _ends_of_groups(points, corners, i, bits):
 
 
 @kernel
-def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shares, places, beside):
+def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shares, places):
     """Cut cells by the chord between the crossings of their sides; two places beside its middle are to be looked at.
 
-    ``beside`` (n, 2) is the pixel where its centre tells instead of a place, or −1. ``shares`` are the parts of the
-    first groups. A cell is `OPEN` if a side is bad, or its centre is on the other side than its group.
+    ``shares`` are the parts of the first groups. A cell is `OPEN` if a side is bad, or its centre is on the other
+    side than its group.
     """
     for i in range(pixels.shape[0]):
         bits = groups[i]
@@ -751,9 +751,7 @@ def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shar
             places.x[2 * i + k] = UNITS * min(max(mx + off * nx, 0.0), 1.0)
             places.y[2 * i + k] = UNITS * min(max(my + off * ny, 0.0), 1.0)
         across = (0.5 - mx) * nx + (0.5 - my) * ny
-        beside[i, 0], beside[i, 1] = -1, -1
         if abs(across) > away:
-            beside[i, 0 if (across > 0.0) == (far0 > 0.0) else 1] = pixels[i]
             surfaces = not _one_surface(points, first, second)
             expected = FIRST if (across > 0.0) == (far0 > 0.0) else SECOND
             bad |= _group(points, pixels[i], first, second, surfaces, step) != expected
@@ -762,10 +760,10 @@ def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shar
 
 @kernel
 def confirm(pixels, corners, groups, shares, beside, points, error, verdict, sums):
-    """Find the light of cells cut; `OPEN` those in which the points ``beside`` the chord disagree."""
+    """Find the light of cells cut; `OPEN` those at whose places of `chords` points, from ``beside`` on, disagree."""
     light = points.light
     for i in range(pixels.shape[0]):
-        bits, one, other = groups[i], beside[i, 0], beside[i, 1]
+        bits, one, other = groups[i], beside + 2 * i, beside + 2 * i + 1
         first, second, step = _ends_of_groups(points, corners, i, bits)
         surfaces = not _one_surface(points, first, second)
         good = _group(points, one, first, second, surfaces, step) == FIRST
