@@ -21,7 +21,7 @@ from ..tracing.kernels.arrays import Start
 from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
 from ..tracing.packing import packed, share
-from ..tracing.sampling import Adaptive, Edges, Sampling, Shoot, adaptive_mean, fixed_sum, number_of_samples
+from ..tracing.sampling import Adaptive, Edges, EvenRays, Sampling, Shoot, adaptive_mean, fixed_sum, number_of_samples
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer, start_tables
 from .audit import FULL_DEPTH, FULL_SAMPLES, Audit, chosen, compared
 from .nearness import parts_of_pixel, pixels_are_nearer, steps_at_content
@@ -347,10 +347,11 @@ class Job:
         assert isinstance(self.camera, IICamera)
         if not hasattr(self._local, "small"):
             pixel = footprint(self.camera)
-            self._local.small = pixel, small_rods(self.scene, self.pose, pixel)
-        pixel, rods = self._local.small
+            rays = EvenRays.of(self.camera) or self.camera
+            self._local.small = pixel, small_rods(self.scene, self.pose, pixel), rays
+        pixel, rods, rays = self._local.small
         return Sight(
-            self.camera, tracer, self.seed, TILE_RAYS, self._footprint(), pixel, rods, self._parts,
+            self.camera, rays, tracer, self.seed, TILE_RAYS, self._footprint(), pixel, rods, self._parts,
             self._shoot(tracer, None), self._check_stopped,
         )  # fmt: skip
 

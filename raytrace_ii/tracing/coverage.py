@@ -35,7 +35,7 @@ class Coverage(Cells):
         self.sight.check()
         within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
         points.body[:] = self._bodies(
-            *self.sight.camera.weighted_rays_at(self.m[places.pixel], self.n[places.pixel], within)
+            *self.sight.rays.weighted_rays_at(self.m[places.pixel], self.n[places.pixel], within)
         )
         points.light[:], points.normal[:] = 0, (0, 0, 1)
         points.light[:, 0] = (points.body + 1) * LIGHT
@@ -56,7 +56,10 @@ class Coverage(Cells):
         kernels.encode(self.points.light[: self.lens.size], self.curve, self.points.code)
         corners, places = np.empty((count, 4), np.int32), _places(4 * count)
         corner_of = np.full((self.lens.size, 4), -1, np.int32)
-        new = kernels.open_pixels(pixels, self.lens, corner_of, self._count, corners, places)
+        plain, never, no_places = self.sight.tracer.scene.plain, -1.0, _places(0)
+        _, new = kernels.open_pixels(
+            pixels, self.lens, corner_of, self.points, plain, never, self._count, corners, places, no_places
+        )  # fmt: skip
         self._look(_part(places, slice(new)))
         verdict, groups = np.empty(count, np.int8), np.zeros(count, np.int8)
         kernels.judge(
@@ -87,7 +90,7 @@ class Coverage(Cells):
             counted.append(self._bodies(L, D, shares).astype(np.int64))
             return np.zeros((len(L), 3), np.float32)
 
-        fixed_sum(s.camera, SAMPLES, s.seed, self.m[pixels], self.n[pixels], s.batch, lambda _: (1, 1), shoot)
+        fixed_sum(s.rays, SAMPLES, s.seed, self.m[pixels], self.n[pixels], s.batch, lambda _: (1, 1), shoot)
         bodies = np.concatenate(counted)
         many = int(bodies.max(initial=0)) + 2
         keys, times = np.unique(np.repeat(pixels, SAMPLES) * many + bodies + 1, return_counts=True)

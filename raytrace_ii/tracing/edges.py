@@ -28,32 +28,33 @@ from .kernels import cells as kernels
 from .kernels.cells import CUT, DONE, MISSED, OPEN, UNITS, Places, Points, Sides
 from .kernels.sampling import lobe_keys
 from .kernels.sampling import places as set_places
+from .packing import packed
 from .sample_places import fixed_places
-from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
+from .sampling import Edges, EvenRays, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
 
 ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
 # Numbers of samples of pixels that are no cells. Others above 16 miss more of an edge than these in turn.
 SETS = np.array([2, 3, 4, 6, 9, 12, 16, 32, 64, 128, 256])
 GOLDEN = (5**0.5 - 1) / 2  # multiples of it share pixels out evenly
-DENSE = 0.3  # share of the pixels, around which much meets, from which on no edges are looked for
+DENSE = 0.28  # share of the pixels, around which much meets, from which on no edges are looked for
 BLOCK, BLOCKS, FEW = 16, 16, 4096  # pixels along a block, one of how many tells of a tile, pixels that all do
 LOOSE = 2.0  # how much more than the error wanted of all pixels may be hidden in one
 SPREAD, SPREAD_ERROR = 0.3, 0.75  # powers of the roughness by which samples of a pixel and their error grow
-PILOTS, OF_PILOTS = 768, (4, 9)  # pixels of a tile that get two sets, which tell of the error
+PILOTS, OF_PILOTS = 400, (4, 9)  # pixels of a tile that get two sets, which tell of the error
 PILOTS_FILTER = 0.6  # times the width of a set's filter: what that errs alike in all sets scatters
 ALIKE = 0.8  # square of the difference of both in parts of the sum of the squares of their errors
 EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per roughness; powers of n by which it falls
+AS_MANY = 2.9  # samples of a set that err as much as corners and centre of a cell
 FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
 DONE_ERROR, CUT_ERROR = 0.5, 0.9  # of cells, in parts of the error wanted
-FOLLOWED, OF_THIN = 64, 16  # how far a thin body is followed, in pixels, and samples to find it
+FOLLOWED, OF_THIN = 64, (4, 16)  # how far a thin body is followed, in pixels, least and most samples to find it
 WHITE = 255.0  # code
 SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 5 ns a pixel each
 THIN = 0.75  # pixels across a body, wider ones cover centres and corners all along
-OF_SMALL = 16, 64  # least and most samples where a small or thin body may be
-IN_STRIP, OF_STRIP = 2, (4, 64)  # how much fewer in a strip around it, which has little of the pixel
+OF_SMALL = 6, 64  # least and most samples where a small or thin body may be
+IN_STRIP, OF_STRIP = 2, (3, 64)  # how much fewer in a strip around it, which has little of the pixel
 SHIFTS = 0.7549, 0.5698  # multiples of them share a square out evenly
-OF_ROD = 500  # vertices that tell the longest axis of a body
 OF_BOX = 1000  # pixels that tell where the content is
 FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
 FINEST = 4096  # places in a pixel along each side that have keys of their own
@@ -73,6 +74,7 @@ class Sight:
     """
 
     camera: IICamera
+    rays: IICamera | EvenRays
     tracer: Tracer
     seed: int
     batch: int
@@ -134,14 +136,15 @@ class Cells:
         doubtful = steps > 0
         if len(self.sight.rods):
             opened[self._small(inside)] = True
-        left, thin = [], np.zeros(many, np.bool_)
+        left, thin, near = [], np.zeros(many, np.bool_), np.empty(many, np.float32)
+        kernels.nearest_around(reach, self.lens, near)
         corner_of = np.full((many, 4), -1, np.int32)
         for _ in range(ROUNDS):
             pixels = np.flatnonzero(doubtful & ~opened & self.own)
             if not len(pixels):
                 break
             opened[pixels] = True
-            left.append(self._open(self._near_together(pixels, reach), corner_of, doubtful, rough, thin))
+            left.append(self._open(self._near_together(pixels, near), corner_of, doubtful, rough, thin))
         self._share_out(np.concatenate(left or [inside[:0]]), rough)
         self._follow(thin, opened)
         return opened
@@ -201,7 +204,7 @@ class Cells:
     def _touched(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
         """Return which pixels small bodies may be seen in, and strips (n, 6) that have them, see `kernels.strips`."""
         one = np.empty(len(pixels), np.int32)
-        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
+        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels])
         kernels.touched(L, D, self.sight.rods, *self.sight.pixel, one)
         which = np.flatnonzero(one != -1)
         one, (L, D) = one[which], self._unit_rays(pixels[which], 0.5, 0.5)
@@ -212,7 +215,7 @@ class Cells:
 
     def _unit_rays(self, pixels: NDArray[np.int64], x: float, y: float) -> tuple[Floats, Floats]:
         within = np.broadcast_to(np.array([x, y]), (len(pixels), 2))
-        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels], within)
+        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels], within)
         length = np.linalg.norm(D, axis=-1, keepdims=True)
         return L, np.divide(D, length, out=D, where=length > 0)
 
@@ -231,22 +234,20 @@ class Cells:
             # a body stands in its strip in the same place in all pixels
             twice[:, :number] = (twice[:, :number] + np.outer(m + 1.6 * n, SHIFTS)[:, None]) % 1.0
             kernels.strip_places(strip[some], twice, shares := np.empty(twice.shape[:2]))
-            L, D, weights = s.camera.weighted_rays_at(m[:, None], n[:, None], twice)
+            L, D, weights = s.rays.weighted_rays_at(m[:, None], n[:, None], twice)
             light = s.shoot(
                 L.reshape(-1, 3), D.reshape(-1, 3), None if weights is None else weights.reshape(-1),
                 numbers=(m, n, 0, count), first=None, traced=np.empty(0, np.int32),
             )  # fmt: skip
             kernels.add_shares(light, shares, pixels[some], self.sums)
 
-    def _near_together(self, pixels: NDArray[np.int64], reach: NDArray[np.float32]) -> NDArray[np.int64]:
+    def _near_together(self, pixels: NDArray[np.int64], near: NDArray[np.float32]) -> NDArray[np.int64]:
         """Return pixels in an order in which the edges that they see are close to each other in the scene.
 
         Rays and shadow rays of one packet then meet the same things: they take 311 instead of 436 ns (*Apples*,
         `setup1` at scale 4, 2026-11-25). An edge belongs to the nearest body around the pixel.
         """
-        near = np.empty(self.lens.size, np.float32)
-        kernels.nearest_around(reach, self.lens, near)
-        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
+        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels])
         far = near[pixels]
         known = np.isfinite(far)
         far[~known] = np.median(far[known]) if known.any() else 1.0
@@ -264,8 +265,14 @@ class Cells:
     ) -> NDArray[np.int64]:  # fmt: skip
         """Find the light of pixels as cells between their corners; return those that are none."""
         count = len(pixels)
-        corners, places = np.empty((count, 4), np.int32), _places(4 * count)
-        new = kernels.open_pixels(pixels, self.lens, corner_of, self._count, corners, places)
+        corners, places, known = np.empty((count, 4), np.int32), _places(4 * count), _places(4 * count)
+        self._make_room(4 * count)
+        first = self._count
+        alike, new = kernels.open_pixels(
+            pixels, self.lens, corner_of, self.points, self.sight.tracer.scene.plain, LOOSE * self.wanted.error,
+            first, corners, places, known,
+        )  # fmt: skip
+        self._count += alike
         self._look(_part(places, slice(new)))
         verdict, groups, steps = np.empty(count, np.int8), np.zeros(count, np.int8), np.zeros(count, np.float32)
         kernels.judge(
@@ -277,19 +284,39 @@ class Cells:
         if len(cut):
             verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])
         self.verdicts[pixels] = verdict
+        kernels.corners_of_open(corners, verdict, first, unsure := np.zeros(alike, np.bool_))
+        self._look_again(first + np.flatnonzero(unsure), _part(known, np.flatnonzero(unsure)), wanted)
         left = verdict == OPEN
         rough[pixels[left]] = steps[left] ** 2 / 3
         return pixels[left]
 
+    def _look_again(self, rows: NDArray[np.int64], places: Places, wanted: NDArray[np.bool_]) -> None:
+        """Look at corners that have the mean of four centres; pixels are wanted where another body is in between.
+
+        Thin bodies go on from open cells to pixels whose centres show nothing of them.
+        """
+        if not len(rows):
+            return
+        first = self._look(places, self.sight.tracer.sees_bodies)
+        other = np.flatnonzero(self.points.body[first : self._count] != self.points.body[rows])
+        self._count = first
+        if len(other):
+            first = self._look(_part(places, other))
+            for array in self.points:
+                array[rows[other]] = array[first : self._count]
+            self._count = first
+            kernels.mark_around(_part(places, other), self.lens, wanted)
+
     def _follow(self, thin: NDArray[np.bool_], opened: NDArray[np.bool_]) -> None:
         """Find the light of pixels in which a thin body may go on that was met nearby, as far as it does."""
         calm = self.own & (self.verdicts != OPEN)
-        pixels = np.flatnonzero(thin & calm)
+        pixels, number = np.flatnonzero(thin & calm), (MISSED * WHITE / 2 / self.wanted.error) ** (4 / 3)
+        number = int(SETS[np.searchsorted(SETS, np.clip(number, *OF_THIN))])
         for _ in range(FOLLOWED):
             if not len(pixels):
                 break
             calm[pixels], opened[pixels], thin[:] = False, True, False
-            self._sample(pixels, np.full(len(pixels), OF_THIN))
+            self._sample(pixels, np.full(len(pixels), number))
             light = self.sums[pixels].astype(np.float32)
             kernels.encode(light, self.curve, codes := np.empty_like(light))
             kernels.follow(pixels, codes, self.points, LOOSE * self.wanted.error, self.lens, thin)
@@ -328,9 +355,8 @@ class Cells:
     def _look(self, places: Places, bodies: bool = False, finer: float = FINER) -> int:
         """Look at places; return the row of the first of their points, of which ``bodies`` alone may be wanted."""
         first, n, s = self._count, len(places.pixel), self.sight
+        self._make_room(n)
         self._count += n
-        if len(self.points.body) < self._count:
-            self.points = _grown(self.points, first, 2 * self._count)
         points = _part(self.points, slice(first, self._count))
         kernels.count_rays(places.pixel, self.rays)
         for start in range(0, n, s.batch):
@@ -340,11 +366,15 @@ class Cells:
             kernels.encode(points.light, self.curve, points.code)
         return first
 
+    def _make_room(self, more: int) -> None:
+        if len(self.points.body) < self._count + more:
+            self.points = _grown(self.points, self._count, 2 * (self._count + more))
+
     def _trace(self, places: Places, points: Points, bodies: bool, finer: float) -> None:
         s, m, n = self.sight, self.m[places.pixel], self.n[places.pixel]
         s.check()
         within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
-        rays = s.camera.weighted_rays_at(m, n, within)
+        rays = s.rays.weighted_rays_at(m, n, within)
         if bodies:
             points.body[:] = s.tracer.bodies(*rays)
             return
@@ -366,6 +396,8 @@ class Cells:
             return
         weights, error = np.maximum(rough[pixels], 1.0).astype(np.float64), self.wanted.error
         pilots = slice((every := max(len(pixels) // PILOTS, 4)) // 2, None, every)
+        cells = self.sums[pixels]
+        estimated = np.isfinite(cells[:, 0])
         edges, noise = self._pilot(pixels[pilots], float(np.mean(weights[pilots])))
         eighths, which, times = np.unique(
             np.rint(8 * np.log2(weights)).astype(np.int64), return_inverse=True, return_counts=True
@@ -375,7 +407,7 @@ class Cells:
         expected = weights**SPREAD_ERROR / np.average(weights**SPREAD_ERROR, weights=times)
         least = (EDGE * weights / (FAR * error) ** 2) ** (1 / EDGES_FALL)
         squares = error**2 * (len(pixels) + done * (1 - DONE_ERROR**2) + cut * (1 - CUT_ERROR**2))
-        of_sets = edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS
+        of_sets = (1 - estimated.mean() * _of_cell(SETS)) * (edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS)
         low, high = -10.0, 10.0
         for _ in range(30):
             middle = (low + high) / 2
@@ -386,7 +418,11 @@ class Cells:
         numbers = _numbers(np.maximum(2.0**high * weights**SPREAD, least)[which])
         todo = np.ones(len(pixels), np.bool_)
         todo[pilots] = numbers[pilots] > sum(OF_PILOTS)
+        numbers[~todo] = sum(OF_PILOTS)
         self._sample(pixels[todo], numbers[todo])
+        shares = _of_cell(numbers[estimated])[:, None]
+        self.sums[pixels[estimated]] *= 1 - shares
+        self.sums[pixels[estimated]] += shares * cells[estimated]
 
     def _pilot(self, some: NDArray[np.int64], rough: float) -> tuple[float, float]:
         """Return the mean square errors, in codes, of a sample: of edges and of noise.
@@ -415,7 +451,7 @@ class Cells:
         s = self.sight
         s.tracer.footprint = s.width[0] * wide / number**0.5, s.width[1] * wide / number**0.5
         s.tracer.lobes = -(-LOBE_RAYS // number), number
-        light = fixed_sum(s.camera, number, s.seed + seed, self.m[pixels], self.n[pixels], s.batch, s.parts, s.shoot)
+        light = fixed_sum(s.rays, number, s.seed + seed, self.m[pixels], self.n[pixels], s.batch, s.parts, s.shoot)
         self.rays[pixels] += number
         return light / number
 
@@ -425,6 +461,11 @@ def _between(wanted: Floats) -> tuple[NDArray[np.int64], Floats]:
     at = np.interp(np.log2(wanted), np.log2(SETS), np.arange(len(SETS)))
     first = np.minimum(at.astype(np.int64), len(SETS) - 2)
     return first, at - first
+
+
+def _of_cell(numbers: NDArray[np.int64]) -> Floats:
+    """Return the weight of corners and centre of a cell beside a set of samples, by least squares at edges."""
+    return np.asarray(1 / (1 + (numbers / AS_MANY) ** EDGES_FALL))
 
 
 def _numbers(wanted: Floats) -> NDArray[np.int64]:
@@ -438,7 +479,7 @@ def small_rods(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats
 
     They are ends in the camera's frame, and radii.
     """
-    rods = np.array([_rod(np.asarray(body.vertices, np.float64)) for body in scene.bodies]).reshape(-1, 7)
+    rods = packed(scene).rods
     ends = (rods[:, :6].reshape(-1, 2, 3) - pose[:3, 3]) @ pose[:3, :3]
     width, spread = pixel
     far = np.linalg.norm(ends, axis=2).min(axis=1)
@@ -446,19 +487,6 @@ def small_rods(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     small = (across < THIN * pixels) | (np.maximum(across, length) < SMALL * pixels)
     return np.column_stack([ends.reshape(-1, 6), rods[:, 6]])[small][:MOST_SMALL]
-
-
-def _rod(vertices: Floats) -> Floats:
-    """Return the ends of the longest axis of a body, and the greatest distance from it."""
-    some = vertices[:: -(-len(vertices) // OF_ROD)]
-    middle = some.mean(axis=0)
-    axis = np.linalg.svd(some - middle, full_matrices=False)[2][0]
-    for points in (some, vertices):  # most bodies are seen to be thick by some of their vertices
-        along = (points - middle) @ axis
-        radius = np.sqrt(np.square(points - middle - along[:, None] * axis).sum(axis=1).max())
-        if radius > np.ptp(along) / 4:
-            break
-    return np.array([*(middle + along.min() * axis), *(middle + along.max() * axis), radius])
 
 
 def dense_mean(
@@ -495,7 +523,7 @@ def edge_mean(
     """
     m, n, lens = with_rim(sight.camera, rows, cols)
     own = ((n >= rows.start) & (n < rows.stop) & (m >= cols.start) & (m < cols.stop)).ravel()
-    rim = ~own & needed(lens, own)
+    rim = ~own if own.all() else ~own & needed(lens, own)
     lens = np.where((own | rim).reshape(lens.shape), lens, -1)
     cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, own)
     inside, points, reach = np.flatnonzero(own)[order], cells.points, np.full(lens.size, np.nan, np.float32)

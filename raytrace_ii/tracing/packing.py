@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -21,6 +22,7 @@ from .kernels.lanes import aligned
 from .kernels.tables import DIRECTIONAL, LEAST_WEIGHT, MATERIAL_COLUMNS, POINT, SPOT
 from .texture_table import TextureTable
 
+OF_ROD = 500  # vertices that tell the longest axis of a body
 MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
 
 _kept: WeakKeyDictionary[Scene, PackedScene] = WeakKeyDictionary()
@@ -59,7 +61,8 @@ class PackedScene:
         self.object_of_face = np.repeat(
             np.arange(len(bodies), dtype=np.int32), [len(body.faces) for body in bodies]
         ).astype(np.int32)
-        bounds = [np.stack([v.min(axis=0), v.max(axis=0)]) for v in (np.asarray(b.vertices) for b in bodies)]
+        self._vertices = [np.asarray(body.vertices) for body in bodies]
+        bounds = [np.stack([v.min(axis=0), v.max(axis=0)]) for v in self._vertices]
         self.clear_bounds = np.array(bounds[first_clear:], np.float64).reshape(-1, 2, 3)
         meeting = _meeting(self.clear_bounds)
         self.nested = min(int(meeting.sum(axis=1).max(initial=0)), MOST_NESTED)
@@ -112,6 +115,16 @@ class PackedScene:
         )  # fmt: skip
         self.surroundings = Surroundings(self.lights, self.background, self.fog, self.ambient)
 
+    @cached_property
+    def plain(self) -> NDArray[np.bool_]:
+        """Bodies (b + 1,) without textures, last the sky."""
+        return np.append(self.materials[:, tables.EXTRAS] == 0, self.background[tables.SKY_IMAGE] < 0)
+
+    @cached_property
+    def rods(self) -> NDArray[np.float64]:
+        """Rods (b, 7) around the bodies: the ends of the longest axis, and the greatest distance from it."""
+        return np.array([_rod(np.asarray(vertices, np.float64)) for vertices in self._vertices]).reshape(-1, 7)
+
     def _maps(self, bodies: Sequence[Body]) -> Maps:
         looks = [body.material for body in bodies]
         return Maps(
@@ -121,6 +134,19 @@ class PackedScene:
             gloss=any(look.metallic_roughness_map is not None for look in looks),
             blend=self.blends,
         )
+
+
+def _rod(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the ends of the longest axis of a body, and the greatest distance from it."""
+    some = vertices[:: -(-len(vertices) // OF_ROD)]
+    middle = some.mean(axis=0)
+    axis = np.linalg.svd(some - middle, full_matrices=False)[2][0]
+    for points in (some, vertices):  # most bodies are seen to be thick by some of their vertices
+        along = (points - middle) @ axis
+        radius = np.sqrt(np.square(points - middle - along[:, None] * axis).sum(axis=1).max())
+        if radius > np.ptp(along) / 4:
+            break
+    return np.array([*(middle + along.min() * axis), *(middle + along.max() * axis), radius])
 
 
 def _lets_through(body: Body) -> bool:

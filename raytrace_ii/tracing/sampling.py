@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IICamera
 
@@ -106,6 +106,54 @@ def number_of_samples(wanted: Sampling) -> tuple[int, int]:
     return (wanted, wanted) if isinstance(wanted, int) else (1, 1)
 
 
+@dataclass(frozen=True)
+class EvenRays:
+    """Rays of a camera whose coordinates grow evenly within a pixel, as those of pinholes do.
+
+    The other fields are those of `kernels.sampling.even_rays`, which takes a sixth of the time of a camera.
+    """
+
+    pixels: tuple[int, int]
+    columns: Floats
+    rows: Floats
+    z: Floats
+    steps: Floats
+    samples_aperture: bool = False
+
+    @classmethod
+    def of(cls, camera: IICamera) -> EvenRays | None:
+        """Return the rays of a camera; None if they are not even."""
+        centres = camera.separable_rays()
+        if centres is None or camera.samples_aperture:
+            return None
+        steps = np.empty((2, 2))
+        for axis, centre in enumerate(centres[:2]):
+            along, across = np.arange(len(centre)), np.zeros(len(centre), np.int64)
+            m, n = (along, across) if axis == 0 else (across, along)
+            low, high = (
+                np.stack([of[:, axis] for of in camera.weighted_rays_at(m, n, place)[:2]], axis=1)
+                for place in (((0.0, 0.5), (1.0, 0.5)) if axis == 0 else ((0.5, 0.0), (0.5, 1.0)))
+            )
+            steps[axis] = (high - low)[0]
+            slack = 1e-12 * np.abs(centre).max()
+            for far, end in ((-0.5, low), (0.5, high)):
+                if not np.allclose(end, centre + far * steps[axis], rtol=1e-12, atol=slack):
+                    return None
+        columns, rows, z = (np.ascontiguousarray(of) for of in centres)
+        return cls(camera.pixels, columns, rows, z, steps)
+
+    def weighted_rays_at(
+        self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), *_: ArrayLike
+    ) -> tuple[Floats, Floats, Floats | None]:
+        """As `IICamera.weighted_rays_at`, for samples (p, 2) or (p, count, 2) of pixels (p,) or (p, 1)."""
+        m, n, within = np.asarray(m).reshape(-1), np.asarray(n).reshape(-1), np.asarray(sample, np.float64)
+        within = np.broadcast_to(within, (len(m), 2)) if within.ndim < 3 else within
+        shape, flat = (*within.shape[:-1], 3), np.ascontiguousarray(within.reshape(len(m), -1, 2))
+        L, D = np.empty((within.size // 2, 3)), np.empty((within.size // 2, 3))
+        sample_kernels.even_rays(m, n, flat, self.columns, self.rows, self.z, self.steps, L, D)
+        return L.reshape(shape), D.reshape(shape), None
+
+
 class Shoot(Protocol):
     """Traces rays of a camera; ``first`` says that these begin their pixels.
 
@@ -124,7 +172,7 @@ Parts = Callable[[int], tuple[int, int]]
 
 
 def fixed_sum(
-    camera: IICamera, samples: int, seed: int, m: NDArray[Any], n: NDArray[Any], batch: int, parts: Parts,
+    camera: IICamera | EvenRays, samples: int, seed: int, m: NDArray[Any], n: NDArray[Any], batch: int, parts: Parts,
     shoot: Shoot,
 ) -> Radiance:  # fmt: skip
     """Return the summed radiance (p, 3) of pixels in columns m and rows n, all with the same number of samples.
@@ -236,7 +284,7 @@ def needed(lens: NDArray[np.int64], own: NDArray[np.bool_]) -> NDArray[np.bool_]
 
 
 def _rays(
-    camera: IICamera,
+    camera: IICamera | EvenRays,
     seed: int,
     table: Floats,
     m: NDArray[Any],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.pages import coding_docs
-from benchmarks.speed import pareto, tessellation
+from benchmarks.speed import commits, pareto, tessellation
 from ii_core import preset
 from raytrace_ii import load_scene
 from raytrace_ii.tracing.packing import packed
@@ -17,6 +17,13 @@ def row(seconds, psnr, **more):
 def test_pareto_front_by_hand():
     rows = [row(3, 40), row(1, 20), row(2, 30), row(2.5, 29), row(1, 19), row(4, 40)]
     assert pareto.front(rows) == [1, 2, 0]
+
+
+def test_times_at_equal_psnr_of_fronts_that_overlap_in_part():
+    """Twice as fast everywhere; settings off the front and PSNR that one alone reaches do not count."""
+    earlier = [row(1, 30), row(4, 38), row(9, 33)]
+    now = [row(seconds / 2, psnr) for seconds, psnr in ((1, 30), (4, 38), (64, 54))]
+    assert commits.times_at_equal_psnr(earlier, now) == pytest.approx(2)
 
 
 def test_recommended_is_the_fastest_setting_below_sensor_noise_or_within_1_db():

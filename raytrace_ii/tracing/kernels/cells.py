@@ -27,6 +27,7 @@ HALF_DIAGONAL = 0.75  # of a pixel, with something to spare
 WIDER, SPARE = 1.02, 0.01  # how much wider than rods strips around them are, times and in pixels
 MOST_STRIP = 0.5  # of a pixel
 LEAST_AWAY = 0.02  # pixels beside a chord at which it is checked
+OF_CENTRE = 0.43  # weight of the centre of a cell, with which cells err least of edges of all angles
 LIKE = 0.4  # the same among the pixels around one
 MOST_GROUPS = 3  # of surfaces and colours around a pixel that is looked at as a cell
 
@@ -375,36 +376,77 @@ def _right_down(corner):
 
 
 @kernel
-def open_pixels(pixels, lens, corner_of, next_point, corners, places):
+def open_pixels(pixels, lens, corner_of, points, plain, error, next_point, corners, places, known_places):
     """Give pixels their corners, which pixels under one lens share.
 
     ``corner_of`` (pixels, 4) are the points at corners, in the row of the first pixel of those that share them; −1
-    where there is none yet. New points, from ``next_point`` on, have ``places``.
+    where there is none yet. A corner between four pixels whose centres look alike within ``error``, on a body that is
+    ``plain``, has their mean: such points stand from ``next_point`` on, at ``known_places``. Those after them have
+    ``places`` to look at.
 
     Returns
     -------
-    int
-        How many points are new.
+    alike, new : int
+        How many points of either kind there are.
     """
     height, width = lens.shape
-    new = 0
+    alike = 0
     for i in range(pixels.shape[0]):
         pixel = pixels[i]
         y, x = pixel // width, pixel % width
         for k in range(4):
             right, down = _right_down(k)
-            owner, slot, found = pixel, k, False
-            for other in range(4):
-                b, a = y + down - 1 + other // 2, x + right - 1 + other % 2
-                if not found and 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
-                    owner, r, d, found = b * width + a, x + right - a, y + down - b, True
-                    slot = 3 - r if d == 1 else r
-            if corner_of[owner, slot] < 0:
-                corner_of[owner, slot] = next_point + new
-                places.pixel[new], places.x[new], places.y[new] = pixel, right * UNITS, down * UNITS
-                new += 1
-            corners[i, k] = corner_of[owner, slot]
-    return new
+            top, left = y + down - 1, x + right - 1
+            owner, slot, found = pixel, k, 0
+            for other in range(3, -1, -1):
+                b, a = top + other // 2, left + other % 2
+                if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
+                    owner, found = b * width + a, found + 1
+                    slot = (0 if a > left else 1) if b > top else (3 if a > left else 2)
+            alone = found == 4 and corner_of[owner, slot] < 0 and plain[points.body[pixel]]
+            if alone and _four_alike(points, top * width + left, width, error):
+                _mean_point(points, top * width + left, width, next_point + alike)
+                corner_of[owner, slot] = next_point + alike
+                at = known_places
+                at.pixel[alike], at.x[alike], at.y[alike] = pixel, right * UNITS, down * UNITS
+                alike += 1
+            known = corner_of[owner, slot]
+            corners[i, k] = known if known >= 0 else -2 - 4 * owner - slot  # to be looked at
+    new = 0
+    for i in range(pixels.shape[0]):
+        for k in range(4):
+            if corners[i, k] < 0:
+                owner, slot = (-2 - corners[i, k]) // 4, (-2 - corners[i, k]) % 4
+                if corner_of[owner, slot] < 0:
+                    right, down = _right_down(k)
+                    corner_of[owner, slot] = next_point + alike + new
+                    places.pixel[new], places.x[new], places.y[new] = pixels[i], right * UNITS, down * UNITS
+                    new += 1
+                corners[i, k] = corner_of[owner, slot]
+    return alike, new
+
+
+@inline_kernel
+def _four_alike(points, first, width, error):
+    """Whether four centres around a corner are on one surface and of one colour."""
+    good = True
+    for other in range(1, 4):
+        j = first + other % 2 + other // 2 * width
+        good &= _one_surface(points, first, j)
+        for before in range(other):
+            good &= _apart(points, j, first + before % 2 + before // 2 * width) * MISSED <= error
+    return good
+
+
+@inline_kernel
+def _mean_point(points, first, width, row):
+    points.body[row] = points.body[first]
+    for c in range(3):
+        points.normal[row, c], light, code = points.normal[first, c], np.float32(0), np.float32(0)
+        for other in range(4):
+            j = first + other % 2 + other // 2 * width
+            light, code = light + points.light[j, c], code + points.code[j, c]
+        points.light[row, c], points.code[row, c] = light * np.float32(0.25), code * np.float32(0.25)
 
 
 @inline_kernel
@@ -430,7 +472,8 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
     """Decide what becomes of each cell; ``sums`` are the light of those done.
 
     ``groups`` are the corners, as bits, in the second group of a cell to cut. ``steps`` are those of cells not done.
-    Pixels beyond a side that an edge crosses are ``wanted``.
+    Pixels beyond a side that an edge crosses are ``wanted``. The ``sums`` of other cells are the estimate that errs
+    least at an edge, NaN on one surface, whose pattern may be in step with the pixels.
     """
     height, width = lens.shape
     q, light = points.code, points.light
@@ -453,6 +496,9 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
                 mean = 0.25 * (float(light[p0, c]) + float(light[p1, c]) + float(light[p2, c]) + float(light[p3, c]))
                 sums[pixel, c] = (mean + 2.0 * light[pixel, c]) / 3.0
             continue
+        for c in range(3):
+            four = float(light[p0, c]) + float(light[p1, c]) + float(light[p2, c]) + float(light[p3, c])
+            sums[pixel, c] = math.nan if surfaces else (1.0 - OF_CENTRE) / 4.0 * four + OF_CENTRE * light[pixel, c]
         first, second = p0, p0
         if surfaces:  # the two colours farthest apart
             far = np.float32(0)
@@ -492,6 +538,25 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
 @inline_kernel
 def _differs(points, i, j, error):
     return points.body[i] != points.body[j] and _apart(points, i, j) * MISSED > error
+
+
+@kernel
+def corners_of_open(corners, verdict, first, wanted):
+    """Tell which points, from ``first`` on, are corners of cells that stay open."""
+    for i in range(corners.shape[0]):
+        for k in range(4):
+            if verdict[i] == OPEN and 0 <= corners[i, k] - first < wanted.shape[0]:
+                wanted[corners[i, k] - first] = True
+
+
+@kernel
+def mark_around(places, lens, wanted):
+    """Mark the pixels around corners."""
+    width = lens.shape[1]
+    for i in range(places.pixel.shape[0]):
+        y, x = places.pixel[i] // width, places.pixel[i] % width
+        down, right = int(places.y[i] > 0), int(places.x[i] > 0)
+        _mark(lens, y + down - 1, y + down, x + right - 1, x + right, lens[y, x], wanted)
 
 
 @kernel

@@ -137,8 +137,8 @@ def test_edges_are_the_same_bits_for_any_workers_and_kept_in_support(camera):
     assert 1 < whole.samples.mean() < 40
     assert whole.samples.sum() == sum(n * pixels for n, pixels in whole.stats.samples.items())
     calm = whole.samples == 1
-    # some have corners whose rays their neighbours sent
-    assert (whole.picture.pixels[calm] == one.picture.pixels[calm]).mean() > 0.98
+    # some have corners that are known without a ray of their own
+    assert (whole.picture.pixels[calm] == one.picture.pixels[calm]).mean() > 0.95
     for name in ("depth", "object_id"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(one, name))
 
