@@ -165,7 +165,7 @@ class Cells:
         """Find the light of all pixels by sets of two numbers of samples that some of the pixels tell."""
         rough = np.empty(self.lens.size, np.float32)
         kernels.roughness(self.points, self.lens, np.empty((self.lens.size, 2), np.float32), rough)
-        pilots = some[max(len(some) // PILOTS, 4) // 2 :: max(len(some) // PILOTS, 4)]
+        pilots = some[_pilots(len(some))]
         edges, noise = self._pilot(pilots, float(np.mean(np.maximum(rough[pilots], 1.0))))
         squares = edges * SETS**-EDGES_FALL + noise * SETS**-NOISE_FALLS
         at = np.interp(-(self.wanted.error**2), -squares, np.arange(len(SETS)))
@@ -395,7 +395,7 @@ class Cells:
         if not len(pixels):
             return
         weights, error = np.maximum(rough[pixels], 1.0).astype(np.float64), self.wanted.error
-        pilots = slice((every := max(len(pixels) // PILOTS, 4)) // 2, None, every)
+        pilots = _pilots(len(pixels))
         cells = self.sums[pixels]
         estimated = np.isfinite(cells[:, 0])
         edges, noise = self._pilot(pixels[pilots], float(np.mean(weights[pilots])))
@@ -487,6 +487,12 @@ def small_rods(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     small = (across < THIN * pixels) | (np.maximum(across, length) < SMALL * pixels)
     return np.column_stack([ends.reshape(-1, 6), rods[:, 6]])[small][:MOST_SMALL]
+
+
+def _pilots(pixels: int) -> slice:
+    """Return every so many-th of some pixels, and at least one."""
+    every = max(pixels // PILOTS, 4)
+    return slice(min(every, pixels) // 2, None, every)
 
 
 def dense_mean(
