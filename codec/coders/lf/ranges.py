@@ -184,10 +184,15 @@ def offsets(
 def over_squares(errors: NDArray[Any]) -> NDArray[Any]:
     """Return errors (disparities, rows, columns) of cells, summed over 3×3 cells."""
     for axis in (1, 2):
-        sides = [(0, 0), (int(axis == 1),) * 2, (int(axis == 2),) * 2]
-        padded, count = np.pad(errors, sides, mode="edge"), errors.shape[axis]
-        errors = padded.take(range(count), axis) + errors + padded.take(range(2, count + 2), axis)
+        before, after = beside(errors, axis)
+        errors = before + errors + after
     return errors
+
+
+def beside(values: NDArray[Any], axis: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return what stands before and after each value along an axis; the outermost ones are repeated."""
+    places, last = np.arange(values.shape[axis]), values.shape[axis] - 1
+    return values.take(np.maximum(places - 1, 0), axis), values.take(np.minimum(places + 1, last), axis)
 
 
 def _cells(errors: NDArray[np.float32], size: int) -> NDArray[np.float32]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ii_core.base.jit import array_kernel
 
-from .ranges import FAR, MARGIN, UNIT, Lattice, Views, cell_errors, offsets, over_squares
+from .ranges import FAR, MARGIN, UNIT, Lattice, Views, beside, cell_errors, offsets, over_squares
 from .rig import FIELDS, MOST, PLACE_UNIT, SHIFT_UNIT
 from .stream import UPRIGHT
 
@@ -63,8 +63,8 @@ class _Registration:
         places = [divmod(at, grid[1]) for at in range(grid[0] * grid[1])]
         self.middle = grid[0] // 2 * grid[1] + grid[1] // 2
         self.others = [at for at in range(len(places)) if at != self.middle]
-        self.luma = np.stack([view(*place)[0] for place in places]).astype(np.float32)
-        self.views = self.luma
+        self.luma = np.stack([view(*place)[0] for place in places])
+        self.views = np.empty(self.luma.shape, np.float32)
         self.leads = offsets(places[self.middle], places, lattice, grid)[:, 1:] / UPRIGHT
         first, last = limits[0] // UNIT, -(-limits[1] // UNIT)
         errors = over_squares(cell_errors(view, grid, places[self.middle], lattice, (first, last)))
@@ -97,7 +97,8 @@ class _Registration:
 
     def _improve(self, moving: bool) -> None:
         for count in SMOOTHINGS:
-            self.views = _smoothed(self.luma, count)
+            for at, luma in enumerate(self.luma):  # one by one: temporary arrays are as large as a view
+                self.views[at] = _smoothed(luma.astype(np.float32), count)
             for at in self.others:
                 differences = self._register(at, self.entries[at])[0]
                 self.scales[at] = OUTLYING * float(np.median(np.abs(differences))) + LEAST_OUTLYING
@@ -138,13 +139,12 @@ class _Registration:
         return found
 
 
-def _smoothed(views: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+def _smoothed(luma: NDArray[np.float32], count: int) -> NDArray[np.float32]:
     for _ in range(count):
-        for axis in (1, 2):
-            sides = [(0, 0), (int(axis == 1),) * 2, (int(axis == 2),) * 2]
-            padded, n = np.pad(views, sides, mode="edge"), views.shape[axis]
-            views = np.float32(0.25) * (padded.take(range(n), axis) + 2 * views + padded.take(range(2, n + 2), axis))
-    return views
+        for axis in (0, 1):
+            before, after = beside(luma, axis)
+            luma = np.float32(0.25) * (before + 2 * luma + after)
+    return luma
 
 
 @array_kernel
