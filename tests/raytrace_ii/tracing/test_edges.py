@@ -139,7 +139,8 @@ def test_edges_are_the_same_bits_for_any_workers_and_kept_in_support(camera):
     assert whole.samples.sum() == sum(n * pixels for n, pixels in whole.stats.samples.items())
     calm = whole.samples == 1
     # some have corners that are known without a ray of their own
-    assert (whole.picture.pixels[calm] == one.picture.pixels[calm]).mean() > 0.95
+    apart = whole.picture.pixels[calm].astype(int) - one.picture.pixels[calm]
+    assert (apart == 0).mean() > 0.97 and np.sqrt(np.mean(apart**2)) < 1
     for name in ("depth", "object_id"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(one, name))
 
