@@ -19,10 +19,10 @@ from ii_core.base.jit import array_kernel, part_kernel, stage_kernel, tuned_kern
 
 from . import contexts as at
 from . import motion
-from .arithmetic import DECODING, Arithmetic, bit_cost, code_bit, code_number, code_raw, number_cost
+from .arithmetic import DECODING, REFINED, Arithmetic, bit_cost, code_bit, code_number, code_raw, number_cost
 from .coefficients import code_coefficients
 from .cross import code_cross, keep_first, rebuild
-from .intra import MODES, SMOOTH, fill_border, predict_intra
+from .intra import MODES, SMOOTH, fill_border, predict_intra, turn_class
 from .samples import LARGEST_SKIPPED, code_samples
 from .transform import LARGEST, SINE_ACROSS, SINE_DOWN, sides, size_of
 from .warp import LATTICE, led, moved_block
@@ -728,7 +728,7 @@ def code_block(coder, job, work, y0, x0, shape, leaf):
     for p in range(3):
         some = cross = 0
         if coded:
-            some, cross = _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped)
+            some, cross = _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped, direction)
             if p == 0:
                 first = some
         if decoding:
@@ -759,7 +759,7 @@ def _predict(job, work, y0, x0, shape, kind, index, mask, direction):
 
 
 @stage_kernel
-def _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped):
+def _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped, direction):
     """Write or read the residual of a plane; return whether there are levels, and the factor of `cross`."""
     decoding = coder.state[DECODING]
     some = cross = 0
@@ -775,7 +775,11 @@ def _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped):
         if decoding:
             _note_levels(job, work, p, y0, x0, shape)
     elif some:
-        code_coefficients(coder, work.levels, p, shape, 1 if kind == INTRA else 0, job.finer, job.dependent)
+        turn = turn_class(direction) if kind == INTRA else 0
+        intra, ways = 1 if kind == INTRA else 0, (job.finer, job.dependent)
+        code_coefficients(coder, work.levels, p, shape, intra, ways, job.levels, (y0, x0), turn)
+        if decoding and coder.state[REFINED]:
+            _note_levels(job, work, p, y0, x0, shape)
     return some, cross
 
 

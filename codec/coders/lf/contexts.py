@@ -70,7 +70,35 @@ TRANSFORM = SLOPE + 16  # block size 4 × (not of cosines alone, of sines alone,
 PARTED = TRANSFORM + 12  # first view, others 2 × area 6 × narrower or lower neighbours 3
 ACROSS = PARTED + 36  # form 3 × narrower above, lower to the left 3
 LAST_PARTED = ACROSS + 9  # plane 3 × area 3 × 12 digits
-COUNT = LAST_PARTED + 108
+ENDED = LAST_PARTED + 108
+# Of version 12: mixed with every other context, and with those of coefficients.
+PLAIN = (
+    *range(SPLIT, SIGNIFICANT),
+    *range(ABOVE_TWO, SIGNIFICANT_THERE),
+    *range(CROSS, SAMPLE),
+    *range(SAMPLE_ABOVE_TWO, SAMPLE_WEIGHTS),
+    *range(REST_NEAR, SIGNIFICANT_FINE),
+    *range(LIKELY, ENDED),
+)  # those of bits that are not mixed before version 12
+ELEMENTS = (
+    (SPLIT, SYNTHESIS, INTRA, INTRA_MODE, MERGE, DELTA, SAME_MASK, MASK, RESIDUAL, CODED, LAST, SIGNIFICANT, ABOVE_TWO)
+    + (REST, BLEND, SIGNIFICANT_THERE, CROSS, IN_TIME, MIXED, VECTOR, INSTANT, COMPONENT, RESIDUAL_IN_TIME, SKIPPED)
+    + (SAMPLE_CODED, SAMPLE, SAMPLE_ABOVE_TWO, SAMPLE_REST, SAMPLE_SIGN, SAMPLE_WEIGHTS, REST_NEAR, FILTERED)
+    + (FILTER_SAME, FILTER_CLASSES, TAP, SIGNIFICANT_FINE, LIKELY, UNDIRECTED, SIDE, STRAIGHT, TURN, SLOPE, TRANSFORM)
+    + (PARTED, ACROSS, LAST_PARTED)
+)  # the first context of each
+HISTORY = ENDED  # element × the four bits of it before 16
+RECENT = HISTORY + 16 * len(ELEMENTS)  # plain context × the two bits of the element before 4
+BESIDE = RECENT + 4 * len(PLAIN)  # states 5 × plane 3 × magnitudes of earlier planes 12 × any around 2 × neighbourhood 4
+TURNED = BESIDE + 5 * 288  # states 5 × plane 3 × direction 6 × row 8 × column 8
+ELEMENT_WEIGHTS = TURNED + 5 * 1152  # element × (three weights; the bits before)
+COEFFICIENT_WEIGHTS = ELEMENT_WEIGHTS + 2 * len(ELEMENTS)  # those of WEIGHTS 15 × (three weights; the fourth)
+COUNT = COEFFICIENT_WEIGHTS + 30
+STARTING_WEIGHTS = (45875, 13107, 13107), (22938, 22938, 16384, 9830)
+# Row of a context's element in `ELEMENTS`, and its place in `PLAIN`.
+ELEMENT_OF = np.searchsorted(ELEMENTS, np.arange(ENDED), side="right") - 1
+PLACE_OF = np.zeros(ENDED, np.int64)
+PLACE_OF[list(PLAIN)] = np.arange(len(PLAIN))
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.
@@ -170,7 +198,7 @@ def starting_contexts() -> NDArray[np.int32]:
     unknown = np.tile([1 << 15, 1 << 15, 0], (COUNT - EXACT, 1))
     contexts = np.concatenate([found, weights, unknown]).astype(np.int32)
     contexts[REST_NEAR:FILTERED] = np.repeat(contexts[REST:BLEND].reshape(3, 1, 16, 3), 6, axis=1).reshape(-1, 3)
-    contexts[LAST_PARTED:COUNT] = contexts[LAST:SIGNIFICANT].reshape(3, 4, 12, 3)[:, :3].reshape(-1, 3)
+    contexts[LAST_PARTED:ENDED] = contexts[LAST:SIGNIFICANT].reshape(3, 4, 12, 3)[:, :3].reshape(-1, 3)
     for to, of, end in (
         (SIGNIFICANT_FINE, SIGNIFICANT, ABOVE_ONE),
         (SIGNIFICANT_FINE + 384, SIGNIFICANT, ABOVE_ONE),
@@ -180,6 +208,11 @@ def starting_contexts() -> NDArray[np.int32]:
         (ABOVE_ONE_THERE_FINE, ABOVE_ONE_THERE, WEIGHTS),
     ):
         contexts[to : to + end - of] = contexts[of:end]
+    plain, coefficients = STARTING_WEIGHTS
+    contexts[ELEMENT_WEIGHTS:COEFFICIENT_WEIGHTS:2] = plain
+    contexts[ELEMENT_WEIGHTS + 1 : COEFFICIENT_WEIGHTS : 2] = 0
+    contexts[COEFFICIENT_WEIGHTS:COUNT:2] = coefficients[:3]
+    contexts[COEFFICIENT_WEIGHTS + 1 : COUNT : 2] = coefficients[3], 0, 0
     return contexts
 
 

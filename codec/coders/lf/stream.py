@@ -17,8 +17,8 @@ from .planes import bt709_colours
 # version 9 other intra modes, too, version 10 halved blocks, version 11 views beside their places. It is written for
 # these alone; lossless coding still writes 2 and 3.
 VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED = 3, 2, 5, 6
-TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED = 7, 8, 9, 10, 11
-FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED
+TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED = 7, 8, 9, 10, 11, 12
+FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED
 _VERSIONS = {
     (False, False): UNCROSSED,
     (True, False): VERSION,
@@ -81,7 +81,9 @@ class Header:
     directed : bool
         Versions 9 to 11: intra blocks smooth borders, have contexts of directions, and transforms of sines.
     parted : bool
-        Versions 10 and 11: squares of blocks may be halved.
+        Versions 10 to 12: squares of blocks may be halved.
+    refined : bool
+        Version 12: all bits with contexts are mixed, those of coefficients of more contexts.
     rig : bytes
         Version 11: departures of views from their places on the lattice, as `rig` packs them; empty without any.
     steps : tuple of int
@@ -103,6 +105,7 @@ class Header:
     dependent: bool = False
     directed: bool = False
     parted: bool = False
+    refined: bool = False
     rig: bytes = b""
     steps: tuple[int, ...]
 
@@ -124,7 +127,9 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
     flags |= _DOWN * (header.lattice[2] < 0) | _BT709 * (header.scales is not None) | _SKEWED * _skewed(header)
     flags |= _RIGGED * bool(header.rig)
     head = _TUNED.pack(
-        FLAGGED[header.dependent + header.directed + header.parted + bool(header.rig)],
+        REFINED
+        if header.refined
+        else FLAGGED[header.dependent + header.directed + header.parted + bool(header.rig)],
         flags,
         header.log_stride | header.sources << 3,
         header.low,
@@ -245,6 +250,7 @@ def _read_tuned(payload: bytes) -> _Read:
         "dependent": version >= DEPENDENT,
         "directed": version >= DIRECTED,
         "parted": version >= PARTED,
+        "refined": version >= REFINED,
         "rig": rig,
     }
     return values, index, at
