@@ -222,7 +222,7 @@ def _code_refined(coder, context, bit):
 
 
 @tuned_kernel
-def code_coefficient(coder, one, other, third, fourth, weights, bit):
+def code_of_four(coder, one, other, third, fourth, weights, bit):
     """As `code_mixed`, of four contexts."""
     contexts = coder.contexts
     a, b, c, d = _odds(contexts, one), _odds(contexts, other), _odds(contexts, third), _odds(contexts, fourth)

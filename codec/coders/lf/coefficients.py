@@ -13,7 +13,7 @@ import numpy as np
 
 from ii_core.base.jit import fused, part_kernel, stage_kernel, tuned_kernel
 
-from .arithmetic import REFINED, bit_cost, code_bit, code_coefficient, code_mixed, code_number, code_raw, number_cost
+from .arithmetic import REFINED, bit_cost, code_bit, code_of_four, code_mixed, code_number, code_raw, number_cost
 from .contexts import (
     ABOVE_ONE,
     ABOVE_ONE_FINE,
@@ -172,7 +172,7 @@ def code_coefficients(coder, levels, plane, shape, intra, ways, planes, corner, 
             if refined:
                 third, fourth = max(state - 1, 0) * 288 + beside, max(state - 1, 0) * 1152 + turned
                 weights = COEFFICIENT_WEIGHTS + 2 * by_size
-                some = code_coefficient(coder, context, other, third, fourth, weights, 1 if size else 0)
+                some = code_of_four(coder, context, other, third, fourth, weights, 1 if size else 0)
             else:
                 some = code_mixed(coder, context, other, WEIGHTS + by_size, 1 if size else 0)
             if not some:
@@ -185,7 +185,7 @@ def code_coefficients(coder, levels, plane, shape, intra, ways, planes, corner, 
         if refined:
             third, fourth = (3 + (state >> 1)) * 288 + beside, (3 + (state >> 1)) * 1152 + turned
             weights = COEFFICIENT_WEIGHTS + 24 + 2 * plane
-            more = code_coefficient(coder, one, other, third, fourth, weights, 1 if size > 1 else 0)
+            more = code_of_four(coder, one, other, third, fourth, weights, 1 if size > 1 else 0)
         else:
             more = code_mixed(coder, one, other, WEIGHTS + 12 + plane, 1 if size > 1 else 0)
         if more:

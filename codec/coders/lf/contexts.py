@@ -91,9 +91,24 @@ HISTORY = ENDED  # element × the four bits of it before 16
 RECENT = HISTORY + 16 * len(ELEMENTS)  # plain context × the two bits of the element before 4
 BESIDE = RECENT + 4 * len(PLAIN)  # states 5 × plane 3 × magnitudes of earlier planes 12 × any around 2 × neighbourhood 4
 TURNED = BESIDE + 5 * 288  # states 5 × plane 3 × direction 6 × row 8 × column 8
-ELEMENT_WEIGHTS = TURNED + 5 * 1152  # element × (three weights; the bits before)
+# Of intra modes. The class of a mode is flat, smooth, from above, from the left, or straight.
+LIKELY_NEAR = TURNED + 5 * 1152  # first, second 2 × class 5 × such modes around 4
+LIKELY_MODE = LIKELY_NEAR + 40  # first, second 2 × mode 36 × that of the block left, below 2
+LIKELY_FORM = LIKELY_MODE + 144  # first, second 2 × square, wide, tall 3 × intra neighbours 4
+UNDIRECTED_SIDES = LIKELY_FORM + 24  # sides of the two likely modes: none, above, left 3 × 3
+UNDIRECTED_FORM = UNDIRECTED_SIDES + 9  # directions around 4 × square, wide, tall 3
+UNDIRECTED_LIKE = UNDIRECTED_FORM + 12  # directions around 4 × intra neighbours 4
+SIDE_VOTES = UNDIRECTED_LIKE + 16  # votes for the left 6 × for above 6
+SIDE_FORM = SIDE_VOTES + 36  # square, wide, tall 3
+SIDE_SIDES = SIDE_FORM + 3  # as UNDIRECTED_SIDES
+STRAIGHT_SAME = SIDE_SIDES + 9  # side 2 × straight modes of this side around 5
+STRAIGHT_FORM = STRAIGHT_SAME + 10  # side 2 × square, wide, tall 3
+STRAIGHT_SIDES = STRAIGHT_FORM + 6  # side 2 × as UNDIRECTED_SIDES
+ELEMENT_WEIGHTS = STRAIGHT_SIDES + 18  # element × (three weights; the bits before)
 COEFFICIENT_WEIGHTS = ELEMENT_WEIGHTS + 2 * len(ELEMENTS)  # those of WEIGHTS 15 × (three weights; the fourth)
-COUNT = COEFFICIENT_WEIGHTS + 30
+# First and second likely mode, flat or smooth, side, straight 5 × (three weights; the fourth).
+MODE_WEIGHTS = COEFFICIENT_WEIGHTS + 30
+COUNT = MODE_WEIGHTS + 10
 STARTING_WEIGHTS = (45875, 13107, 13107), (22938, 22938, 16384, 9830)
 # Row of a context's element in `ELEMENTS`, and its place in `PLAIN`.
 ELEMENT_OF = np.searchsorted(ELEMENTS, np.arange(ENDED), side="right") - 1
@@ -208,11 +223,11 @@ def starting_contexts() -> NDArray[np.int32]:
         (ABOVE_ONE_THERE_FINE, ABOVE_ONE_THERE, WEIGHTS),
     ):
         contexts[to : to + end - of] = contexts[of:end]
-    plain, coefficients = STARTING_WEIGHTS
-    contexts[ELEMENT_WEIGHTS:COEFFICIENT_WEIGHTS:2] = plain
+    three, four = STARTING_WEIGHTS
+    contexts[ELEMENT_WEIGHTS:COEFFICIENT_WEIGHTS:2] = three
     contexts[ELEMENT_WEIGHTS + 1 : COEFFICIENT_WEIGHTS : 2] = 0
-    contexts[COEFFICIENT_WEIGHTS:COUNT:2] = coefficients[:3]
-    contexts[COEFFICIENT_WEIGHTS + 1 : COUNT : 2] = coefficients[3], 0, 0
+    contexts[COEFFICIENT_WEIGHTS:COUNT:2] = four[:3]
+    contexts[COEFFICIENT_WEIGHTS + 1 : COUNT : 2] = four[3], 0, 0
     return contexts
 
 
