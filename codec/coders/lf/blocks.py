@@ -409,14 +409,53 @@ def _side_of(mode):
 
 
 @stage_kernel
+def _mode_class(mode):
+    """0 flat, 1 smooth, 2 from above, 3 from the left, 4 straight."""
+    if mode <= SMOOTH:
+        return np.int64(mode)
+    return np.int64(4 if (mode - 2) % SIDE == STRAIGHT else 1 + _side_of(mode))
+
+
+@stage_kernel
+def around_block(blocks, field, by, bx, shape, none):
+    """Values of the blocks at the corner, above the right end, and to the left of the lower end."""
+    h, w = sides(shape)
+    corner = above = left = none
+    if by > 0:
+        above = np.int64(blocks[field, by - 1, min(bx + (w >> 2), blocks.shape[2]) - 1])
+    if bx > 0:
+        left = np.int64(blocks[field, min(by + (h >> 2), blocks.shape[1]) - 1, bx - 1])
+    if by > 0 and bx > 0:
+        corner = np.int64(blocks[field, by - 1, bx - 1])
+    return corner, above, left
+
+
+@tuned_kernel
+def _code_residual(coder, job, by, bx, shape, kind, direction, coded):
+    """Write or read whether a block has a residual."""
+    context = residual_context(job, by, bx, shape, kind)
+    if not coder.state[REFINED]:
+        return code_bit(coder, context, coded)
+    blocks, mode = job.blocks, np.int64(0)
+    if kind == INTRA:
+        first = np.int64(blocks[DIRECTION, by, bx - 1]) if bx > 0 else np.int64(SMOOTH)
+        second = np.int64(blocks[DIRECTION, by - 1, bx]) if by > 0 else np.int64(SMOOTH)
+        corner, above, left = around_block(blocks, DIRECTION, by, bx, shape, np.int64(SMOOTH))
+        mode = 6 * _mode_class(direction) + (1 if first == direction else 0) + (1 if second == direction else 0)
+        mode += (1 if corner == direction else 0) + (1 if above == direction else 0) + (1 if left == direction else 0)
+    corner, above, left = around_block(blocks, CODED, by, bx, shape, np.int64(0))
+    near = neighbours(blocks, np.int64(CODED), np.int64(1), by, bx) + corner + above + left
+    moded, near = at.RESIDUAL_MODE + kind * 30 + mode, at.RESIDUAL_NEAR + kind * 6 + near
+    formed = at.RESIDUAL_FORM + ((shape[0] - 2) * 4 + shape[1] - 2) * 2 + (1 if kind == INTRA else 0)
+    return code_of_four(coder, context, moded, near, formed, at.MODE_WEIGHTS + 10, coded)
+
+
+@stage_kernel
 def _code_likely(coder, likely, which, one, where, around, like, form):
     """Write or read whether a mode is the first likely one, or the second; ``where`` holds the mode."""
     corner, above, left = around
     agree = (1 if corner == likely else 0) + (1 if above == likely else 0) + (1 if left == likely else 0)
-    kind = likely if likely <= SMOOTH else 1 + _side_of(likely)
-    if likely > SMOOTH and (likely - 2) % SIDE == STRAIGHT:
-        kind = np.int64(4)
-    near = at.LIKELY_NEAR + (which * 5 + kind) * 4 + agree
+    near = at.LIKELY_NEAR + (which * 5 + _mode_class(likely)) * 4 + agree
     alike = at.LIKELY_MODE + (which * MODES + likely) * 2 + (1 if left == likely else 0)
     formed = at.LIKELY_FORM + (which * 3 + form) * 4 + like
     return code_of_four(coder, one, near, alike, formed, at.MODE_WEIGHTS + 2 * which, 1 if where == likely else 0)
@@ -430,15 +469,8 @@ def _code_mode_around(coder, job, by, bx, shape, mode):
     one, two, undirected, smooth = mode_contexts(job, by, bx, shape)
     like = (one - at.LIKELY) & 3
     form = 0 if shape[0] == shape[1] else (1 if shape[0] < shape[1] else 2)
-    h, w = sides(shape)
-    corner = above = left = np.int64(SMOOTH)
-    if by > 0:
-        above = np.int64(blocks[DIRECTION, by - 1, min(bx + (w >> 2), blocks.shape[2]) - 1])
-    if bx > 0:
-        left = np.int64(blocks[DIRECTION, min(by + (h >> 2), blocks.shape[1]) - 1, bx - 1])
-    if by > 0 and bx > 0:
-        corner = np.int64(blocks[DIRECTION, by - 1, bx - 1])
-    around = corner, above, left
+    around = around_block(blocks, DIRECTION, by, bx, shape, np.int64(SMOOTH))
+    _, above, left = around
     if _code_likely(coder, first, 0, one, mode, around, like, form):
         return first
     if _code_likely(coder, second, 1, two, mode, around, like, form):
@@ -792,7 +824,7 @@ def code_block(coder, job, work, y0, x0, shape, leaf):
     kind, index, mask, direction = code_kind(coder, job, by, bx, shape, kind, index, mask, direction)
     if decoding:
         _predict(job, work, y0, x0, shape, kind, index, mask, direction)
-    coded = code_bit(coder, residual_context(job, by, bx, shape, kind), np.int64(blocks[CODED, by, bx]))
+    coded = _code_residual(coder, job, by, bx, shape, kind, direction, np.int64(blocks[CODED, by, bx]))
     first = skipped = 0
     if coded and job.skipping and shape[0] + shape[1] <= LARGEST_SKIPPED:
         skipped = code_bit(coder, skipped_context(job, by, bx, shape), np.int64(blocks[SKIPPED, by, bx]) & 1)

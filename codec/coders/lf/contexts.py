@@ -104,11 +104,15 @@ SIDE_SIDES = SIDE_FORM + 3  # as UNDIRECTED_SIDES
 STRAIGHT_SAME = SIDE_SIDES + 9  # side 2 × straight modes of this side around 5
 STRAIGHT_FORM = STRAIGHT_SAME + 10  # side 2 × square, wide, tall 3
 STRAIGHT_SIDES = STRAIGHT_FORM + 6  # side 2 × as UNDIRECTED_SIDES
-ELEMENT_WEIGHTS = STRAIGHT_SIDES + 18  # element × (three weights; the bits before)
+# Of whether a block has a residual.
+RESIDUAL_MODE = STRAIGHT_SIDES + 18  # kind 5 × class of the mode 5 of intra blocks × such modes around 6, else 0
+RESIDUAL_NEAR = RESIDUAL_MODE + 150  # kind 5 × residuals around 6
+RESIDUAL_FORM = RESIDUAL_NEAR + 30  # height 4 × width 4 × intra or not 2
+ELEMENT_WEIGHTS = RESIDUAL_FORM + 32  # element × (three weights; the bits before)
 COEFFICIENT_WEIGHTS = ELEMENT_WEIGHTS + 2 * len(ELEMENTS)  # those of WEIGHTS 15 × (three weights; the fourth)
-# First and second likely mode, flat or smooth, side, straight 5 × (three weights; the fourth).
+# First and second likely mode, flat or smooth, side, straight, residual 6 × (three weights; the fourth).
 MODE_WEIGHTS = COEFFICIENT_WEIGHTS + 30
-COUNT = MODE_WEIGHTS + 10
+COUNT = MODE_WEIGHTS + 12
 STARTING_WEIGHTS = (45875, 13107, 13107), (22938, 22938, 16384, 9830)
 # Row of a context's element in `ELEMENTS`, and its place in `PLAIN`.
 ELEMENT_OF = np.searchsorted(ELEMENTS, np.arange(ENDED), side="right") - 1
