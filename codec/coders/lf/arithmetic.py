@@ -1,7 +1,7 @@
 """Adaptive binary arithmetic coding: one function for both directions.
 
 `code_bit` writes a bit or reads one, by the direction of the coder it is given, so that each syntax element is
-written down once for encoder and decoder.
+written down once for encoder and decoder. From version 12 on the coder is refined: all bits with a context are mixed.
 
 A context holds two probabilities of a one in units of 2^-16, which follow the bits at two rates, and the number of
 bits seen. Their mean is used. The range coder is that of LZMA (Pavlov) with 40 bits of range instead of 32: bytes
@@ -207,7 +207,9 @@ def _code_refined(coder, context, bit):
     before = np.int64(contexts[weights + 1, 0])
     long, short = HISTORY + 16 * element + before, RECENT + 4 * np.int64(PLACE_OF[context]) + (before & 3)
     a, b, c = _odds(contexts, context), _odds(contexts, long), _odds(contexts, short)
-    odds = np.int64(contexts[weights, 0]) * a + np.int64(contexts[weights, 1]) * b + np.int64(contexts[weights, 2]) * c
+    odds = (
+        np.int64(contexts[weights, 0]) * a + np.int64(contexts[weights, 1]) * b + np.int64(contexts[weights, 2]) * c
+    )
     p = _mixed_probability(odds)
     bit = _code_with(coder, p, bit)
     missed = ((ONE if bit else 0) - p) * REFINED_RATE
@@ -223,7 +225,7 @@ def _code_refined(coder, context, bit):
 
 @tuned_kernel
 def code_of_four(coder, one, other, third, fourth, weights, bit):
-    """As `code_mixed`, of four contexts."""
+    """As `code_mixed`, of four contexts; the fourth weight stands in the row after the others."""
     contexts = coder.contexts
     a, b, c, d = _odds(contexts, one), _odds(contexts, other), _odds(contexts, third), _odds(contexts, fourth)
     odds = np.int64(contexts[weights, 0]) * a + np.int64(contexts[weights, 1]) * b

@@ -19,7 +19,17 @@ from ii_core.base.jit import array_kernel, part_kernel, stage_kernel, tuned_kern
 
 from . import contexts as at
 from . import motion
-from .arithmetic import DECODING, REFINED, Arithmetic, bit_cost, code_bit, code_number, code_of_four, code_raw, number_cost
+from .arithmetic import (
+    DECODING,
+    REFINED,
+    Arithmetic,
+    bit_cost,
+    code_bit,
+    code_number,
+    code_of_four,
+    code_raw,
+    number_cost,
+)
 from .coefficients import code_coefficients
 from .cross import code_cross, keep_first, rebuild
 from .intra import MODES, SMOOTH, fill_border, predict_intra, turn_class
@@ -484,10 +494,10 @@ def _code_mode_around(coder, job, by, bx, shape, mode):
     if code_of_four(coder, undirected, at.UNDIRECTED_SIDES + both, formed, liked, weights, bit):
         return code_bit(coder, smooth, mode)
     votes = np.int64(0)
-    for side in range(2):
-        count = 2 * ((1 if one_side == side + 1 else 0) + (1 if two_side == side + 1 else 0))
-        count += (1 if above_side == side + 1 else 0) + (1 if left_side == side + 1 else 0)
-        votes += min(count, 5) * (6 if side else 1)
+    for which in range(1, 3):
+        count = 2 * ((1 if one_side == which else 0) + (1 if two_side == which else 0))
+        count += (1 if above_side == which else 0) + (1 if left_side == which else 0)
+        votes += min(count, 5) * (6 if which == 2 else 1)
     value, weights = mode - 2, at.MODE_WEIGHTS + 6
     formed, sided = np.int64(at.SIDE_FORM + form), at.SIDE_SIDES + both
     side = code_of_four(

@@ -185,7 +185,7 @@ def decoded_batches(
     field: Field, levels: list[bytes], threads: int = 1, contexts: Contexts | None = None
 ) -> Iterator[tuple[int, list[Node], int]]:
     """Decode one batch of views after another; yield the level, the views, and the bytes read so far."""
-    contexts, work = contexts or Contexts(), new_work()
+    contexts, work = contexts or Contexts(field.header.refined), new_work()
     before = stream.head_bytes(field.header, levels)
     with clock.Workers(threads) as workers:
         for level, data in enumerate(levels):
@@ -324,7 +324,7 @@ class Source:
     def coded(self, setting: float, *, forgetful: bool = False) -> tuple[bytes, Field]:
         """The payload at a quantiser, and what the decoder will make of it: all, or views that predict others."""
         field = self.field(self.header_at(setting))
-        levels = self.levels(field, Contexts(), forgetful=forgetful)
+        levels = self.levels(field, Contexts(field.header.refined), forgetful=forgetful)
         return stream.pack(field.header, levels, self.count), field
 
     def header_at(self, setting: float) -> Header:
@@ -340,7 +340,7 @@ class Source:
         trial.header = replace(header, steps=(step,) * len(header.steps))
         trial.levels = trial.levels[:TRIAL_LEVELS]
         effort, self.effort = self.effort, 0
-        self.levels(trial, Contexts())
+        self.levels(trial, Contexts(trial.header.refined))
         self.effort = effort
         errors = np.zeros(3)
         for place in np.argwhere(trial.decoded).tolist():

@@ -13,7 +13,7 @@ import numpy as np
 
 from ii_core.base.jit import fused, part_kernel, stage_kernel, tuned_kernel
 
-from .arithmetic import REFINED, bit_cost, code_bit, code_of_four, code_mixed, code_number, code_raw, number_cost
+from .arithmetic import REFINED, bit_cost, code_bit, code_mixed, code_number, code_of_four, code_raw, number_cost
 from .contexts import (
     ABOVE_ONE,
     ABOVE_ONE_FINE,
@@ -144,8 +144,9 @@ def _beside(planes, plane, corner, y, x, h, w, near, dependent):
 def code_coefficients(coder, levels, plane, shape, intra, ways, planes, corner, turn):
     """Write or read levels[:h, :w], of which one at least is not zero; a reader finds only zeros there before.
 
-    ``ways`` say whether contexts are those of version 7, and whether the quantiser is dependent. From version 12 on, ``planes`` are the levels of earlier planes, the block's from a corner on, and ``turn`` is the
-    class of its direction.
+    ``ways`` say whether contexts are those of version 7, and whether the quantiser is dependent. In a refined coder
+    ``planes`` are the levels of earlier planes, the block's from a corner on, and ``turn`` is `intra.turn_class` of
+    its mode, 0 of other blocks.
     """
     (h, w), log, refined = sides(shape), size_of(shape), coder.state[REFINED]
     finer, dependent = ways

@@ -81,15 +81,52 @@ PLAIN = (
     *range(LIKELY, ENDED),
 )  # those of bits that are not mixed before version 12
 ELEMENTS = (
-    (SPLIT, SYNTHESIS, INTRA, INTRA_MODE, MERGE, DELTA, SAME_MASK, MASK, RESIDUAL, CODED, LAST, SIGNIFICANT, ABOVE_TWO)
-    + (REST, BLEND, SIGNIFICANT_THERE, CROSS, IN_TIME, MIXED, VECTOR, INSTANT, COMPONENT, RESIDUAL_IN_TIME, SKIPPED)
-    + (SAMPLE_CODED, SAMPLE, SAMPLE_ABOVE_TWO, SAMPLE_REST, SAMPLE_SIGN, SAMPLE_WEIGHTS, REST_NEAR, FILTERED)
-    + (FILTER_SAME, FILTER_CLASSES, TAP, SIGNIFICANT_FINE, LIKELY, UNDIRECTED, SIDE, STRAIGHT, TURN, SLOPE, TRANSFORM)
-    + (PARTED, ACROSS, LAST_PARTED)
+    SPLIT,
+    SYNTHESIS,
+    INTRA,
+    INTRA_MODE,
+    MERGE,
+    DELTA,
+    SAME_MASK,
+    MASK,
+    RESIDUAL,
+    CODED,
+    LAST,
+    ABOVE_TWO,
+    REST,
+    BLEND,
+    CROSS,
+    IN_TIME,
+    MIXED,
+    VECTOR,
+    INSTANT,
+    COMPONENT,
+    RESIDUAL_IN_TIME,
+    SKIPPED,
+    SAMPLE_CODED,
+    SAMPLE_ABOVE_TWO,
+    SAMPLE_REST,
+    SAMPLE_SIGN,
+    REST_NEAR,
+    FILTERED,
+    FILTER_SAME,
+    FILTER_CLASSES,
+    TAP,
+    LIKELY,
+    UNDIRECTED,
+    SIDE,
+    STRAIGHT,
+    TURN,
+    SLOPE,
+    TRANSFORM,
+    PARTED,
+    ACROSS,
+    LAST_PARTED,
 )  # the first context of each
 HISTORY = ENDED  # element × the four bits of it before 16
 RECENT = HISTORY + 16 * len(ELEMENTS)  # plain context × the two bits of the element before 4
-BESIDE = RECENT + 4 * len(PLAIN)  # states 5 × plane 3 × magnitudes of earlier planes 12 × any around 2 × neighbourhood 4
+# States 5 × plane 3 × earlier planes' magnitudes 12 × any around 2 × neighbourhood 4.
+BESIDE = RECENT + 4 * len(PLAIN)
 TURNED = BESIDE + 5 * 288  # states 5 × plane 3 × direction 6 × row 8 × column 8
 # Of intra modes. The class of a mode is flat, smooth, from above, from the left, or straight.
 LIKELY_NEAR = TURNED + 5 * 1152  # first, second 2 × class 5 × such modes around 4
@@ -205,10 +242,63 @@ PROBABILITIES = (
     65374,
 )  # of each digit, in 2^-16
 TRUSTED = 4  # bits that such a beginning counts as
+# Of version 12, that replace those before: the mean over six photographs and two scenes, at five quantisers each.
+REFINED_STARTS = (
+    "BMQPKRRSOUWXKXdfTfjfZkljDfwsWkslbjo*OQPLZTTQcVUTEH76OPLGgVUVKGCDPMMPcSZZN9INfLU*pT**3OYMNGYgMdadjJhcZgNdcWjQfh"
+    "eQRRMNJI******TQNbgZjXaRLdWakXZ****************UZ****TS********VX**ZZTU**OR****TU**WZNSacQU**LLKVfnHUepTXnwEIT"
+    "aOMVhXQZj4DOHHRZWWjol4KVRLQckbenvFUSbOWVUXfY*CQTXVXenibfj5S**VY**aZ**6GJITXc*hXa*y*y*y*y*y*t*v*r*j7kLhFbTNDfZU"
+    "9ZUV6TLXBUSiBRYeAaUlfbE0*******hljcYG0*****emmifbVG2***SgccXaULP***UUVE1*******ZbZVRD4*****ZiigbXSHE***LUWUR*U"
+    "*****VWTE3*******YdaVTE5*****ZficaVTGB***JWXTR*T*****UcYbYhfkLYXYZcejMWWXYcehQWWXZdhqRZZaZfhlKXXYaehlIVVXZbehI"
+    "UUWYbcgOZYbYkkoJWWZbefkHTWXYceiESUVWZchTjffdgggHTVYZegeLRVXYbdfMSTVWZckXaaZbhegLYXZffeeIWXaagccSMTS****UZZcbhf"
+    "fNYXbdehkHUWaZefeDTWWadaaSWXYdhkmQXZadfgjJUWYadgjCSUWZbdf*YWYYWU*VVXdVZ**SUYX*Z**RWUWY***XdYdbggeKXZZbdcaIXXYa"
+    "abaQVTW****RaabbihlNXYaaegjIUXZZdgeGUVWaYbXOYYbZkhkQWYaZfhhLUWZZcdiESVYYaed*abbWXUWPaYbZZXWMVWWUUX*AUTTU***DLF"
+    "JLNNOQQSWXacgCJELKPPTQTTaWZZcAJEMKQOTRSUaXZbdJOLONOOQQRSWVabgHMJNMQOSPUSZWabeHOJPMTNRPUSZWaafROLKLPMMQ*******R"
+    "PMLNNOQ********SPMNIUK*********FYdUZSWQSVZSXQVRUTXTXUXUUTVSVVXaYUcQWNSMMRXNTNRLOQTPSOTRRTQRQTTYWQaKUHNIFKUETCO"
+    "GHLQFQJQMQRLQORQSTQYJSRL*KMSQT*U**QL*Q*****P******ZaNVKRILVWJSGPQMVTLRTRURMPSP*Z**TYLR8KAEPT8P9NGFRRAPONUMRIRM"
+    "UOUUPVFL4D4AHM4H4EDAQO9O*K*MNI*K*U**WX*S*****U**********************ZbTWPSKNVXOTMSOPSSLTWZ*UKOSP*S**SYLTFOGGOT"
+    "FSJPOOQQJRTR*KMMTN*P*NOWEQAKJFIP9MIN*OSMLOUP*TRHUO*P*RWW*O*****F**********************HUGQFNGLGQGOFMFKHOGMGLIK"
+    "IMGLEKMOCLCHEDKJCIIENDTGMJLHSEUILKMHRIUTCMCJ9HIGCJEGJHPFLJJFOFUEKHMGUIUK**************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "*****************************************************************************************************0102****0"
+    "102***********************************************************************************************************"
+    "**********************NWZ7Naz*x*S5*3Z6*3KMQPSSTWINRQTTVUJMTOSWVY********ILRORUVY********NMNPQSTWXJKPSSUTUUE**O"
+    "**T***********CSWMVVSYZ*********SNPOSTVZKJHISOTXKMKLUSXYTQRRSUUWWG**K**J**JQUKKUKRXQQQRQUVZQQNOOUTWNUPRNWUcTPL"
+    "LJEH*********JBU*************PPMN************T**VSWYbV*********QMLLORNNQU******SOKJNNMMQ*******VRMJINMMQ******"
+    "*aWQKINMMQ*******eZVPJKNMQ*******heaVQNKKP*******QMJLNNOQ********TOHLNNOQ********VQMMMNOQ********ZUPLLNOQ*****"
+    "***cYVHNNOQ********aZVTOMOQ********QLLMIUK*********UPJMIUK*********VRMLHUK*********ZVOKJUK*********bYVQHUK****"
+    "*****ZaUSLTK*********YBjY9fZ8iVggOTJRKVeXTQHP******VQQOMOU*****OPSPQUU*****************dXVRLR******YVSONP*****"
+    "*WWVRPN******JJMS********YjaeXnkmOdcdglkkQeddihljYedeYlfqOdbbahgoMbbedhkmJaYbcijnJaZdeghjNdVZVjlqFYWaafhkDUZbb"
+    "fhlDXZabdhhbibXaccdRWZWZcdfPTXYXcfeSVWXYYceWfYaYfffKZZbegfdMYXdcdccSW******UZYaZfhhPaXZchjhIVXabegcDVUXbaaaPYU"
+    "XckkjSWYaakkiJWXZbgfg9SWWaecd*h*ZWW**WVX*YZU*UVTVT***WQYWW***VfXcahggMYZZbddZMYVYacbaVXUT****PdYaajiiNWZaZeffJ"
+    "VYacedeDVYXaYZYMYUaXiikQRUcbhigMTYaafdeFTXWaacZ*f*bXUW*UXaZbYW*WTWVWX**RVWWWW**RajgbmipOeggjlnlSgfhkjllUcihqgi"
+    "eQbaVbjhnLaaeelnpLabfdkkmLcbedgjiOcZaUkkoCXXZcgjmGVbcbginFYbbbghkOYebZfccWYZZcdfiSYUYbddhSUUXYZaiVYaXbgefNaccd"
+    "gecLZYaZdccSa******TVZabghhPbZccmnfHVZbcedeCXVYYcbZPUYWcihjRVacZjjkLWaabejgAUXYcfgd**YWWW**WTcWXW**LbYR*SW*NV*"
+    "U*W**UccaZhhgLYbZacaYLZWYabbaVYU*****QZbYYhjiMZaaaeffHVZacggfDWYYZZZXLSXaYjjjQSXcbkkgKVYabfdfDSXYZcdd**YWUZX*S"
+    "ZYWWcW*SXYX*W**HTaUT***bdWXYZVVZaXXYYaYWVXXYYWWZYXXbbebWbTWTTSPVYRUSTRPVVTUTUVTVSVSYTbVQbLVLPNIPVKTHQKKRRNSPRP"
+    "QTNUPVRXWTZTWXT*QSVVY*a**TR*a*****U******ZYOQWUKNUVOSKSPTPSKS*STPXRRR*X**SWJQDMDHPS9PDMLKSQIRPMQNSLUPQP*TOVCN5"
+    "EA9HN5IAFIHPOFL*P*MNH*J*U**aX******************************bZPQUXPOUUOROSTUPQQQSTWSTRPSWT**UWPSHNHJPSCRINPPSQM"
+    "RSQ*OQMUP*P*OPVFPDLLFLPCOLK*OSNMQ*R*PML*M*Q*RdX*W*****K**********************cfbcdbYWccbabbbYaaebdaaYcYbZbZeeX"
+    "dVYVVVQWZWWWVVSZWXXYWbVZTaUbWeZTcPWNPRISWNULQPKVSSSWTbSYOZQdUdYWZNVLR*QRURY*V**MN*T*****P******YaUWTWTMXZUTVT*"
+    "PYWXXUW*UbQUV*X**UYJTBMDERV9TFOLNSSLU*P*PVN*O*P**RXDO7GK9JQ8IJCQEQQLL*O*QNL*O****VW*T*****M*******************"
+    "***ZaTWVWSRUXQUTWTQTTQXTbTWSS*S*V**VYPVMPQITUKVPP*NXRSS*U*TUM*R*Q**IX5P6GLBCP6JL9*FQOLN*N*RUN*H*S*UVW*S*****K*"
+    "*********************IULPMNPQRUUYYbdfKOJQLRQURVVZXbbfJOKPMNPVTUVYYbddNWLTKRKOLTKRJQJPKRJQJPKONQMPKQORMQJNNLNOJ"
+    "NPMRJTNPNONTKUSSMTL*O*ULRLONNOMMPLOONULROMNSMUIRNTLUL*LOTQXNTSVNQRUYRSVGPRPJSRQLRRUTUSSGMQSVTSTVS*TSWQTUU*TQUQ"
+    "RUPVYXYWVZVWYUUBI*SWcKQVQWZMQTPZd01*IUZ126HOQ13D7PSPVaJTTSXimhbQ64******loldZP3G****mrmnhfcQ5Q**VXVM0*******ae"
+    "dYVK1*****clkmfbZKC***WXVK0*******YfcZWK1*****bjkeccZGB***"
+)
+REFINED_TRUSTED = 7
 
 
-def starting_contexts() -> NDArray[np.int32]:
-    """Contexts (COUNT, 3) at the beginning of a stream: two probabilities in 2^-16, and bits seen."""
+def starting_contexts(refined: bool = False) -> NDArray[np.int32]:
+    """Contexts (COUNT, 3) at the beginning of a stream: two probabilities in 2^-16, and bits seen.
+
+    Those of version 12 are ``refined``.
+    """
     # Whole probabilities of every digit: decoders need not agree on an exponential function.
     found = np.array(
         [(*(2 * [PROBABILITIES[DIGITS.index(d)]]), TRUSTED) if d != "*" else (1 << 15, 1 << 15, 0) for d in STARTS]
@@ -227,6 +317,10 @@ def starting_contexts() -> NDArray[np.int32]:
         (ABOVE_ONE_THERE_FINE, ABOVE_ONE_THERE, WEIGHTS),
     ):
         contexts[to : to + end - of] = contexts[of:end]
+    if refined:
+        known = [i for i, digit in enumerate(REFINED_STARTS) if digit != "*"]
+        starts = np.array([PROBABILITIES[DIGITS.index(REFINED_STARTS[i])] for i in known])
+        contexts[known] = np.stack([starts, starts, np.full_like(starts, REFINED_TRUSTED)], axis=1)
     three, four = STARTING_WEIGHTS
     contexts[ELEMENT_WEIGHTS:COEFFICIENT_WEIGHTS:2] = three
     contexts[ELEMENT_WEIGHTS + 1 : COEFFICIENT_WEIGHTS : 2] = 0
@@ -242,8 +336,8 @@ class Contexts:
     before: a view needs no levels beyond its own.
     """
 
-    def __init__(self) -> None:
-        self._latest, self._ended = starting_contexts(), dict[int, NDArray[np.int32]]()
+    def __init__(self, refined: bool) -> None:
+        self._latest, self._ended = starting_contexts(refined), dict[int, NDArray[np.int32]]()
 
     def of(self, level: int) -> NDArray[np.int32]:
         """Return the contexts with which a level begins; coding changes them."""

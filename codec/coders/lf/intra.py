@@ -23,8 +23,8 @@ TURNS = np.array([1] * 2 + [2] * 5 + [3] * 7 + [4] * 5 + [2] * 5 + [5] * 7 + [4]
 
 @stage_kernel
 def turn_class(mode):
-    """Class of an intra mode: 1 without a direction, 2 far from straight, 3 near it from above, 4 back, 5 and from left."""
-    return int(TURNS[mode])
+    """Class of an intra mode: 1 without a direction, 3 near straight down, 5 near straight across, 2, 4 else."""
+    return np.int64(TURNS[mode])
 
 
 @tuned_kernel
