@@ -493,16 +493,14 @@ def _code_mode_around(coder, job, by, bx, shape, mode):
     bit, weights = 1 if mode <= SMOOTH else 0, at.MODE_WEIGHTS + 4
     if code_of_four(coder, undirected, at.UNDIRECTED_SIDES + both, formed, liked, weights, bit):
         return code_bit(coder, smooth, mode)
-    votes = np.int64(0)
+    votes = 0
     for which in range(1, 3):
         count = 2 * ((1 if one_side == which else 0) + (1 if two_side == which else 0))
         count += (1 if above_side == which else 0) + (1 if left_side == which else 0)
         votes += min(count, 5) * (6 if which == 2 else 1)
     value, weights = mode - 2, at.MODE_WEIGHTS + 6
-    formed, sided = np.int64(at.SIDE_FORM + form), at.SIDE_SIDES + both
-    side = code_of_four(
-        coder, np.int64(at.SIDE), at.SIDE_VOTES + votes, formed, sided, weights, 1 if value >= SIDE else 0
-    )
+    sided, bit = at.SIDE_SIDES + both, 1 if value >= SIDE else 0
+    side = code_of_four(coder, np.int64(at.SIDE), at.SIDE_VOTES + votes, at.SIDE_FORM + form, sided, weights, bit)
     straight = 2 + SIDE * side + STRAIGHT
     same = (1 if first == straight else 0) + (1 if second == straight else 0)
     same += (1 if above == straight else 0) + (1 if left == straight else 0)
