@@ -205,6 +205,7 @@ def test_halves_fit_bars():
     pixels = np.repeat(np.repeat(bars, 24, axis=0)[..., None], 3, axis=2).astype(np.uint8)
     picture = IIPicture(np.ascontiguousarray(pixels), pixels.shape[1::-1], (1, 1))
     source = lf.Source(picture, checked_options(lf.LightField(), {}))
+    source.header = replace(source.header, refined=False)
     halved, _ = source.coded(30 * lf.FRACTIONS)
     source.header = replace(source.header, parted=False)
     squares, _ = source.coded(30 * lf.FRACTIONS)

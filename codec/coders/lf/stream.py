@@ -127,7 +127,7 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
     flags |= _DOWN * (header.lattice[2] < 0) | _BT709 * (header.scales is not None) | _SKEWED * _skewed(header)
     flags |= _RIGGED * bool(header.rig)
     head = _TUNED.pack(
-        REFINED,
+        REFINED if header.refined else FLAGGED[header.dependent + header.directed + header.parted + bool(header.rig)],
         flags,
         header.log_stride | header.sources << 3,
         header.low,
