@@ -1,4 +1,4 @@
-"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 11: the same bytes decode to the same pixels on every machine.
+"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 12: the same bytes decode to the same pixels on every machine.
 
 In ``tests/golden/lf.zip``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
@@ -8,7 +8,8 @@ views of *Apples* at quantiser 26; the first encoder that left out transforms wr
 views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. ``dependent.ii``, of
 version 8, ``directed.ii``, of version 9, and ``parted.ii``, of version 10, hold 5×4 of those views of 46×35 pixels at
 quantiser 32. ``rigged.ii``, of version 11, holds `moved_planes` of `test_lf_tuning`, 3×4 views of 72×64 pixels at
-quantiser 36. The decoder has integer arithmetic alone, so that a hash of the pixels is the expectation.
+quantiser 36; ``refined.ii``, of version 12, such views with noise, at quantiser 30. The decoder has integer
+arithmetic alone, so that a hash of the pixels is the expectation.
 """
 
 import contextlib
@@ -41,6 +42,7 @@ PIXELS = {
     "directed": "f3d2f5aaf76a3db69ab2b2cb58612ba11f7fbc5b101a8a96d99cedcffffb3b84",
     "parted": "4fed4243261259d830d4fb3764e1c4d2ab4062f7e87ff84fe47535170d7c80a9",
     "rigged": "b9bd647343a6ee5bd856526e9af14e8691de67989ee53125ff71c11f53b8391f",
+    "refined": "f50066bc34f045614162d0f107263d80257350780e91125f6845f0af951d54ab",
     "row": "8779e10e45bc0ef8e8a3921c5f3ed192d0b0dad3092e0d9619ae1a54c87281c0",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
@@ -56,6 +58,7 @@ VERSIONS = {
     "directed": stream.DIRECTED,
     "parted": stream.PARTED,
     "rigged": stream.RIGGED,
+    "refined": stream.REFINED,
 }
 
 
@@ -90,7 +93,7 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
 
 def test_versions_are_the_numbers_in_the_streams():
     numbers = stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED
-    assert (*numbers, *stream.FLAGGED) == (2, 3, 5, 6, 7, 8, 9, 10, 11)
+    assert (*numbers, *stream.FLAGGED) == (2, 3, 5, 6, 7, 8, 9, 10, 11, 12)
 
 
 def test_the_third_stream_has_blocks_without_a_transform(monkeypatch):
@@ -140,6 +143,23 @@ def test_the_parted_stream_has_blocks_of_unequal_sides(monkeypatch):
     assert {kind for kind, tall, wide in found if tall != wide} >= {INTRA, EXPLICIT}
     assert max(abs(tall - wide) for _, tall, wide in found) == 2
     assert {0, 2, 4, 6} <= transforms
+
+
+def test_the_refined_stream_has_departures_and_modes_of_all_classes(monkeypatch):
+    """Flat, smooth, straight and oblique intra blocks with each kind of transform and without one."""
+    kinds, modes, code = set(), set(), Field.code
+
+    def noting(field, coder, job, work, *same):
+        code(field, coder, job, work, *same)
+        assert field.header.rig
+        intra = job.blocks[KIND] == INTRA
+        kinds.update(job.blocks[SKIPPED][job.blocks[CODED] == 1].tolist())
+        modes.update(job.blocks[DIRECTION][intra].tolist())
+
+    monkeypatch.setattr(Field, "code", noting)
+    decode(Encoded.load(FOLDER / "refined.ii"))
+    assert {0, 1, 2, 4, 6} == kinds
+    assert {0, 1, 10, 34} <= modes
 
 
 def test_the_tuned_stream_has_filters_of_several_kinds(monkeypatch):

@@ -63,7 +63,7 @@ def test_decoding_repeats_the_encoder_to_the_bit(dtype, options):
     picture = specks(dtype, grid=(3, 4), lenses=(19, 10))
     source = lf.Source(picture, checked_options(lf.LightField(), options))
     payload, field = source.coded(30 * lf.FRACTIONS)
-    assert payload[0] == stream.PARTED
+    assert payload[0] == stream.REFINED
     shown = np.empty_like(picture.pixels)
     field.show(shown)
     coded = encode(picture, "si-lf:cross=0" if options else "si-lf", qp=30)
@@ -135,19 +135,22 @@ def values_by_definition(levels, shape):
     st.integers(0, 2),
     st.integers(0, 2**32 - 1),
     st.sampled_from([0.02, 0.3, 1.0]),
+    st.booleans(),
 )
-def test_levels_of_a_dependent_quantiser_are_read_as_they_were_written(shape, plane, seed, density):
+def test_levels_of_a_dependent_quantiser_are_read_as_they_were_written(shape, plane, seed, density, refined):
+    """Before version 12, and from it on in contexts of earlier planes beside them."""
     rng = np.random.default_rng(seed)
     levels = np.zeros((32, 32), np.int32)
     h, w = 1 << shape[0], 1 << shape[1]
     levels[:h, :w] = _some_levels(rng, max(h, w), density)[:h, :w] // 2
     levels[rng.integers(4), rng.integers(4)] = 1
     values = values_by_definition(levels, shape)
-    coder = arithmetic.writer(contexts.starting_contexts(), 1 << 14)
-    coefficients.code_coefficients(coder, values, plane, shape, 1, 1, 1)
-    reader = arithmetic.reader(contexts.starting_contexts(), arithmetic.finish(coder))
+    where = rng.integers(-2, 3, (3, 40, 44)).astype(np.int16), (8, 12), 3
+    coder = arithmetic.writer(contexts.starting_contexts(), 1 << 14, refined=refined)
+    coefficients.code_coefficients(coder, values, plane, shape, 1, (1, 1), *where)
+    reader = arithmetic.reader(contexts.starting_contexts(), arithmetic.finish(coder), refined=refined)
     found = np.zeros((32, 32), np.int32)
-    coefficients.code_coefficients(reader, found, plane, shape, 1, 1, 1)
+    coefficients.code_coefficients(reader, found, plane, shape, 1, (1, 1), *where)
     np.testing.assert_array_equal(found, values)
 
 
@@ -177,7 +180,7 @@ def test_a_dependent_quantiser_keeps_to_its_states_and_knows_its_error(shape, se
     np.testing.assert_allclose(decoded, levels * step * 9 / 16, atol=0.5)
     np.testing.assert_allclose(np.square(decoded - block).sum(), error, rtol=0.05)  # the decoder rounds
     coder = arithmetic.writer(contexts.starting_contexts(), 1 << 14)
-    coefficients.code_coefficients(coder, levels, 0, shape, 1, 1, 1)
+    coefficients.code_coefficients(coder, levels, 0, shape, 1, (1, 1), np.zeros((3, 32, 32), np.int16), (0, 0), 0)
     # Contexts learn while they are written, and costs leave out those that are mixed with others.
     assert abs(8 * len(arithmetic.finish(coder)) / bits - 1) < 0.15
 
@@ -202,6 +205,7 @@ def test_halves_fit_bars():
     pixels = np.repeat(np.repeat(bars, 24, axis=0)[..., None], 3, axis=2).astype(np.uint8)
     picture = IIPicture(np.ascontiguousarray(pixels), pixels.shape[1::-1], (1, 1))
     source = lf.Source(picture, checked_options(lf.LightField(), {}))
+    source.header = replace(source.header, refined=False)
     halved, _ = source.coded(30 * lf.FRACTIONS)
     source.header = replace(source.header, parted=False)
     squares, _ = source.coded(30 * lf.FRACTIONS)

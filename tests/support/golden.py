@@ -3,7 +3,7 @@
 ``coders.zip`` has one file a scheme, ``SCHEME.ii``, and the pixels that it decodes to, ``SCHEME.png``: coded once by
 the version that introduced the scheme, and never replaced; ``compact-header`` and ``first-header`` hold both headers.
 ``pytest -n 0 tests/codec/test_golden.py --make-golden`` adds those of new schemes, and to ``defaults.json`` every
-option's default, which files leave out. ``lf.zip`` has streams of `si-lf` of versions 3 to 11.
+option's default, which files leave out. ``lf.zip`` has streams of `si-lf` of versions 3 to 12.
 """
 
 import atexit

@@ -1,7 +1,7 @@
 """Adaptive binary arithmetic coding: one function for both directions.
 
 `code_bit` writes a bit or reads one, by the direction of the coder it is given, so that each syntax element is
-written down once for encoder and decoder.
+written down once for encoder and decoder. From version 12 on the coder is refined: all bits with a context are mixed.
 
 A context holds two probabilities of a one in units of 2^-16, which follow the bits at two rates, and the number of
 bits seen. Their mean is used. The range coder is that of LZMA (Pavlov) with 40 bits of range instead of 32: bytes
@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel, tuned_kernel
 
-LOW, RANGE, CACHE, WAITING, AT, DECODING, CODE = range(7)
+from .contexts import ELEMENT_OF, ELEMENT_WEIGHTS, HISTORY, PLACE_OF, RECENT
+
+LOW, RANGE, CACHE, WAITING, AT, DECODING, CODE, REFINED, REGISTERS = range(9)
 FULL = (1 << 40) - 1
 LEAST_RANGE = 1 << 32
 ONE = 1 << 16
@@ -34,7 +36,7 @@ COSTS = -np.log2(np.maximum(np.arange(4097), 0.5) / 4096).astype(np.float32)
 
 # Log odds in 2^-8 of probabilities in 2^-12, and probabilities in 2^-16 of log odds up to FARTHEST.
 FARTHEST = 1900
-MIXING_RATE = 3
+MIXING_RATE, REFINED_RATE = 3, 41
 _P = np.maximum(np.arange(4096), 0.5) / 4096
 STRETCHED = np.rint(256 * np.log(_P / (1 - _P))).astype(np.int32)
 SQUASHED = np.rint(ONE / (1 + np.exp(-np.arange(-FARTHEST, FARTHEST + 1) / 256))).astype(np.int32)
@@ -56,10 +58,10 @@ def new_contexts(count: int) -> NDArray[np.int32]:
     return contexts
 
 
-def writer(contexts: NDArray[np.int32], capacity: int) -> Arithmetic:
-    """A coder that writes at most so many bytes; `finish` gives them."""
-    state = np.zeros(7, np.int64)
-    state[RANGE], state[WAITING] = FULL, 1
+def writer(contexts: NDArray[np.int32], capacity: int, *, refined: bool = False) -> Arithmetic:
+    """A coder that writes at most so many bytes; `finish` gives them. It mixes as of version 12 if it is refined."""
+    state = np.zeros(REGISTERS, np.int64)
+    state[RANGE], state[WAITING], state[REFINED] = FULL, 1, refined
     return Arithmetic(contexts, state, np.zeros(capacity, np.uint8))
 
 
@@ -72,10 +74,10 @@ def enlarged(coder: Arithmetic, capacity: int) -> Arithmetic:
     return coder._replace(data=data)
 
 
-def reader(contexts: NDArray[np.int32], data: bytes) -> Arithmetic:
-    """A coder that reads bytes, and zeros after them."""
-    state = np.zeros(7, np.int64)
-    state[RANGE], state[DECODING], state[AT] = FULL, 1, 5
+def reader(contexts: NDArray[np.int32], data: bytes, *, refined: bool = False) -> Arithmetic:
+    """A coder that reads bytes, and zeros after them. It mixes as of version 12 if it is refined."""
+    state = np.zeros(REGISTERS, np.int64)
+    state[RANGE], state[DECODING], state[AT], state[REFINED] = FULL, 1, 5, refined
     state[CODE] = int.from_bytes(data[:5].ljust(5, b"\0"), "big")
     return Arithmetic(contexts, state, np.array(np.frombuffer(data, np.uint8)))
 
@@ -186,9 +188,67 @@ def _learn(contexts, context, bit):
         contexts[context, 2] = seen + 1
 
 
+@stage_kernel
+def _odds(contexts, context):
+    """Log odds of a one, in units of 2^-8."""
+    return np.int64(STRETCHED[probability(contexts, context) >> 4])
+
+
+@stage_kernel
+def _mixed_probability(odds):
+    return np.int64(SQUASHED[min(max(odds >> 16, -FARTHEST), FARTHEST) + FARTHEST])
+
+
+@tuned_kernel
+def _code_refined(coder, context, bit):
+    """As `code_bit`, mixed with the bits of the same element before."""
+    contexts, element = coder.contexts, np.int64(ELEMENT_OF[context])
+    weights = ELEMENT_WEIGHTS + 2 * element
+    before = np.int64(contexts[weights + 1, 0])
+    long, short = HISTORY + 16 * element + before, RECENT + 4 * np.int64(PLACE_OF[context]) + (before & 3)
+    a, b, c = _odds(contexts, context), _odds(contexts, long), _odds(contexts, short)
+    odds = (
+        np.int64(contexts[weights, 0]) * a + np.int64(contexts[weights, 1]) * b + np.int64(contexts[weights, 2]) * c
+    )
+    p = _mixed_probability(odds)
+    bit = _code_with(coder, p, bit)
+    missed = ((ONE if bit else 0) - p) * REFINED_RATE
+    contexts[weights, 0] += (a * missed) >> 20
+    contexts[weights, 1] += (b * missed) >> 20
+    contexts[weights, 2] += (c * missed) >> 20
+    contexts[weights + 1, 0] = (2 * before + bit) & 15
+    _learn(contexts, context, bit)
+    _learn(contexts, long, bit)
+    _learn(contexts, short, bit)
+    return bit
+
+
+@tuned_kernel
+def code_of_four(coder, one, other, third, fourth, weights, bit):
+    """As `code_mixed`, of four contexts; the fourth weight stands in the row after the others."""
+    contexts = coder.contexts
+    a, b, c, d = _odds(contexts, one), _odds(contexts, other), _odds(contexts, third), _odds(contexts, fourth)
+    odds = np.int64(contexts[weights, 0]) * a + np.int64(contexts[weights, 1]) * b
+    odds += np.int64(contexts[weights, 2]) * c + np.int64(contexts[weights + 1, 0]) * d
+    p = _mixed_probability(odds)
+    bit = _code_with(coder, p, bit)
+    missed = ((ONE if bit else 0) - p) * REFINED_RATE
+    contexts[weights, 0] += (a * missed) >> 20
+    contexts[weights, 1] += (b * missed) >> 20
+    contexts[weights, 2] += (c * missed) >> 20
+    contexts[weights + 1, 0] += (d * missed) >> 20
+    _learn(contexts, one, bit)
+    _learn(contexts, other, bit)
+    _learn(contexts, third, bit)
+    _learn(contexts, fourth, bit)
+    return bit
+
+
 @tuned_kernel
 def code_bit(coder, context, bit):
     """Write or read a bit in a context, which learns it; return it."""
+    if coder.state[REFINED]:
+        return _code_refined(coder, context, bit)
     bit = _code_with(coder, probability(coder.contexts, context), bit)
     _learn(coder.contexts, context, bit)
     return bit
@@ -201,14 +261,12 @@ def code_mixed(coder, one, other, weights, bit):
     ``contexts[weights, :2]`` are the weights in 2^-16.
     """
     contexts = coder.contexts
-    a = np.int64(STRETCHED[probability(contexts, one) >> 4])
-    b = np.int64(STRETCHED[probability(contexts, other) >> 4])
-    odds: Any = (np.int64(contexts[weights, 0]) * a + np.int64(contexts[weights, 1]) * b) >> 16
-    p = np.int64(SQUASHED[min(max(odds, -FARTHEST), FARTHEST) + FARTHEST])
+    a, b = _odds(contexts, one), _odds(contexts, other)
+    p = _mixed_probability(np.int64(contexts[weights, 0]) * a + np.int64(contexts[weights, 1]) * b)
     bit = _code_with(coder, p, bit)
-    missed = (ONE if bit else 0) - p
-    contexts[weights, 0] += (a * missed * MIXING_RATE) >> 20
-    contexts[weights, 1] += (b * missed * MIXING_RATE) >> 20
+    missed = ((ONE if bit else 0) - p) * (REFINED_RATE if coder.state[REFINED] else MIXING_RATE)
+    contexts[weights, 0] += (a * missed) >> 20
+    contexts[weights, 1] += (b * missed) >> 20
     _learn(contexts, one, bit)
     _learn(contexts, other, bit)
     return bit

@@ -19,10 +19,20 @@ from ii_core.base.jit import array_kernel, part_kernel, stage_kernel, tuned_kern
 
 from . import contexts as at
 from . import motion
-from .arithmetic import DECODING, Arithmetic, bit_cost, code_bit, code_number, code_raw, number_cost
+from .arithmetic import (
+    DECODING,
+    REFINED,
+    Arithmetic,
+    bit_cost,
+    code_bit,
+    code_number,
+    code_of_four,
+    code_raw,
+    number_cost,
+)
 from .coefficients import code_coefficients
 from .cross import code_cross, keep_first, rebuild
-from .intra import MODES, SMOOTH, fill_border, predict_intra
+from .intra import MODES, SMOOTH, fill_border, predict_intra, turn_class
 from .samples import LARGEST_SKIPPED, code_samples
 from .transform import LARGEST, SINE_ACROSS, SINE_DOWN, sides, size_of
 from .warp import LATTICE, led, moved_block
@@ -384,6 +394,8 @@ def mode_contexts(job, by, bx, shape):
 @tuned_kernel
 def _code_mode(coder, job, by, bx, shape, mode):
     """Write or read an intra mode: one of two likely ones, flat, smooth, or a direction."""
+    if coder.state[REFINED]:
+        return _code_mode_around(coder, job, by, bx, shape, mode)
     first, second = likely_directions(job.blocks, by, bx)
     one, two, undirected, smooth = mode_contexts(job, by, bx, shape)
     if code_bit(coder, one, 1 if mode == first else 0):
@@ -392,7 +404,111 @@ def _code_mode(coder, job, by, bx, shape, mode):
         return second
     if code_bit(coder, undirected, 1 if mode <= SMOOTH else 0):
         return code_bit(coder, smooth, mode) if smooth >= 0 else code_raw(coder, mode)
-    return 2 + (_code_slope(coder, mode - 2) if job.directed else _code_direction(coder, mode - 2))
+    if not job.directed:
+        return 2 + _code_direction(coder, mode - 2)
+    value = mode - 2
+    side = code_bit(coder, np.int64(at.SIDE), 1 if value >= SIDE else 0)
+    straight = code_bit(coder, np.int64(at.STRAIGHT + side), 1 if value == SIDE * side + STRAIGHT else 0)
+    return 2 + (SIDE * side + STRAIGHT if straight else _code_slope(coder, value, side))
+
+
+@stage_kernel
+def _side_of(mode):
+    """0 without a direction, 1 from above, 2 from the left."""
+    return 0 if mode <= SMOOTH else (1 if mode < 2 + SIDE else 2)
+
+
+@stage_kernel
+def _mode_class(mode):
+    """0 flat, 1 smooth, 2 from above, 3 from the left, 4 straight."""
+    if mode <= SMOOTH:
+        return np.int64(mode)
+    return np.int64(4 if (mode - 2) % SIDE == STRAIGHT else 1 + _side_of(mode))
+
+
+@stage_kernel
+def around_block(blocks, field, by, bx, shape, none):
+    """Values of the blocks at the corner, above the right end, and to the left of the lower end."""
+    h, w = sides(shape)
+    corner = above = left = none
+    if by > 0:
+        above = np.int64(blocks[field, by - 1, min(bx + (w >> 2), blocks.shape[2]) - 1])
+    if bx > 0:
+        left = np.int64(blocks[field, min(by + (h >> 2), blocks.shape[1]) - 1, bx - 1])
+    if by > 0 and bx > 0:
+        corner = np.int64(blocks[field, by - 1, bx - 1])
+    return corner, above, left
+
+
+@tuned_kernel
+def _code_residual(coder, job, by, bx, shape, kind, direction, coded):
+    """Write or read whether a block has a residual."""
+    context = residual_context(job, by, bx, shape, kind)
+    if not coder.state[REFINED]:
+        return code_bit(coder, context, coded)
+    blocks, mode = job.blocks, np.int64(0)
+    if kind == INTRA:
+        first = np.int64(blocks[DIRECTION, by, bx - 1]) if bx > 0 else np.int64(SMOOTH)
+        second = np.int64(blocks[DIRECTION, by - 1, bx]) if by > 0 else np.int64(SMOOTH)
+        corner, above, left = around_block(blocks, DIRECTION, by, bx, shape, np.int64(SMOOTH))
+        mode = 6 * _mode_class(direction) + (1 if first == direction else 0) + (1 if second == direction else 0)
+        mode += (1 if corner == direction else 0) + (1 if above == direction else 0) + (1 if left == direction else 0)
+    corner, above, left = around_block(blocks, CODED, by, bx, shape, np.int64(0))
+    near = neighbours(blocks, np.int64(CODED), np.int64(1), by, bx) + corner + above + left
+    moded, near = at.RESIDUAL_MODE + kind * 30 + mode, at.RESIDUAL_NEAR + kind * 6 + near
+    formed = at.RESIDUAL_FORM + ((shape[0] - 2) * 4 + shape[1] - 2) * 2 + (1 if kind == INTRA else 0)
+    return code_of_four(coder, context, moded, near, formed, at.MODE_WEIGHTS + 10, coded)
+
+
+@stage_kernel
+def _code_likely(coder, likely, which, one, where, around, like, form):
+    """Write or read whether a mode is the first likely one, or the second; ``where`` holds the mode."""
+    corner, above, left = around
+    agree = (1 if corner == likely else 0) + (1 if above == likely else 0) + (1 if left == likely else 0)
+    near = at.LIKELY_NEAR + (which * 5 + _mode_class(likely)) * 4 + agree
+    alike = at.LIKELY_MODE + (which * MODES + likely) * 2 + (1 if left == likely else 0)
+    formed = at.LIKELY_FORM + (which * 3 + form) * 4 + like
+    return code_of_four(coder, one, near, alike, formed, at.MODE_WEIGHTS + 2 * which, 1 if where == likely else 0)
+
+
+@tuned_kernel
+def _code_mode_around(coder, job, by, bx, shape, mode):
+    """As `_code_mode`, from version 12 on: contexts are of the modes around, and mixed."""
+    blocks = job.blocks
+    first, second = likely_directions(blocks, by, bx)
+    one, two, undirected, smooth = mode_contexts(job, by, bx, shape)
+    like = (one - at.LIKELY) & 3
+    form = 0 if shape[0] == shape[1] else (1 if shape[0] < shape[1] else 2)
+    around = around_block(blocks, DIRECTION, by, bx, shape, np.int64(SMOOTH))
+    _, above, left = around
+    if _code_likely(coder, first, 0, one, mode, around, like, form):
+        return first
+    if _code_likely(coder, second, 1, two, mode, around, like, form):
+        return second
+    one_side, two_side, above_side, left_side = _side_of(first), _side_of(second), _side_of(above), _side_of(left)
+    both = one_side * 3 + two_side
+    directed = (1 if one_side else 0) + (1 if two_side else 0) + (1 if above_side else 0) + (1 if left_side else 0)
+    directed = min(directed, 3)
+    formed, liked = at.UNDIRECTED_FORM + directed * 3 + form, at.UNDIRECTED_LIKE + directed * 4 + like
+    bit, weights = 1 if mode <= SMOOTH else 0, at.MODE_WEIGHTS + 4
+    if code_of_four(coder, undirected, at.UNDIRECTED_SIDES + both, formed, liked, weights, bit):
+        return code_bit(coder, smooth, mode)
+    votes = 0
+    for which in range(1, 3):
+        count = 2 * ((1 if one_side == which else 0) + (1 if two_side == which else 0))
+        count += (1 if above_side == which else 0) + (1 if left_side == which else 0)
+        votes += min(count, 5) * (6 if which == 2 else 1)
+    value, weights = mode - 2, at.MODE_WEIGHTS + 6
+    sided, bit = at.SIDE_SIDES + both, 1 if value >= SIDE else 0
+    side = code_of_four(coder, np.int64(at.SIDE), at.SIDE_VOTES + votes, at.SIDE_FORM + form, sided, weights, bit)
+    straight = 2 + SIDE * side + STRAIGHT
+    same = (1 if first == straight else 0) + (1 if second == straight else 0)
+    same += (1 if above == straight else 0) + (1 if left == straight else 0)
+    formed, sided = at.STRAIGHT_FORM + side * 3 + form, at.STRAIGHT_SIDES + side * 9 + both
+    bit, weights = 1 if mode == straight else 0, at.MODE_WEIGHTS + 8
+    if code_of_four(coder, at.STRAIGHT + side, at.STRAIGHT_SAME + side * 5 + same, formed, sided, weights, bit):
+        return straight
+    return 2 + _code_slope(coder, value, side)
 
 
 @tuned_kernel
@@ -409,12 +525,9 @@ def _code_direction(coder, value):
 
 
 @tuned_kernel
-def _code_slope(coder, value):
-    """34 directions: from which side, straight or not, which way it turns, and how far."""
-    side = code_bit(coder, np.int64(at.SIDE), 1 if value >= SIDE else 0)
+def _code_slope(coder, value, side):
+    """The directions of a side but the straight one: which way it turns, and how far."""
     slope = value - SIDE * side - STRAIGHT
-    if code_bit(coder, np.int64(at.STRAIGHT + side), 1 if slope == 0 else 0):
-        return SIDE * side + STRAIGHT
     back = code_bit(coder, np.int64(at.TURN + side), 1 if slope < 0 else 0)
     size, node = abs(slope) - 1, np.int64(1)
     for place in range(2, -1, -1):
@@ -424,7 +537,7 @@ def _code_slope(coder, value):
 
 @part_kernel
 def _slope_cost(costs, value):
-    """Bits that `_code_slope` would take."""
+    """Bits that a direction would take from version 9 on."""
     side = 1 if value >= SIDE else 0
     slope = value - SIDE * side - STRAIGHT
     bits = bit_cost(costs, np.int64(at.SIDE), side) + bit_cost(costs, at.STRAIGHT + side, 1 if slope == 0 else 0)
@@ -719,7 +832,7 @@ def code_block(coder, job, work, y0, x0, shape, leaf):
     kind, index, mask, direction = code_kind(coder, job, by, bx, shape, kind, index, mask, direction)
     if decoding:
         _predict(job, work, y0, x0, shape, kind, index, mask, direction)
-    coded = code_bit(coder, residual_context(job, by, bx, shape, kind), np.int64(blocks[CODED, by, bx]))
+    coded = _code_residual(coder, job, by, bx, shape, kind, direction, np.int64(blocks[CODED, by, bx]))
     first = skipped = 0
     if coded and job.skipping and shape[0] + shape[1] <= LARGEST_SKIPPED:
         skipped = code_bit(coder, skipped_context(job, by, bx, shape), np.int64(blocks[SKIPPED, by, bx]) & 1)
@@ -728,7 +841,7 @@ def code_block(coder, job, work, y0, x0, shape, leaf):
     for p in range(3):
         some = cross = 0
         if coded:
-            some, cross = _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped)
+            some, cross = _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped, direction)
             if p == 0:
                 first = some
         if decoding:
@@ -759,7 +872,7 @@ def _predict(job, work, y0, x0, shape, kind, index, mask, direction):
 
 
 @stage_kernel
-def _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped):
+def _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped, direction):
     """Write or read the residual of a plane; return whether there are levels, and the factor of `cross`."""
     decoding = coder.state[DECODING]
     some = cross = 0
@@ -775,7 +888,11 @@ def _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped):
         if decoding:
             _note_levels(job, work, p, y0, x0, shape)
     elif some:
-        code_coefficients(coder, work.levels, p, shape, 1 if kind == INTRA else 0, job.finer, job.dependent)
+        turn = turn_class(direction) if kind == INTRA else 0
+        intra, ways = 1 if kind == INTRA else 0, (job.finer, job.dependent)
+        code_coefficients(coder, work.levels, p, shape, intra, ways, job.levels, (y0, x0), turn)
+        if decoding and coder.state[REFINED]:
+            _note_levels(job, work, p, y0, x0, shape)
     return some, cross
 
 

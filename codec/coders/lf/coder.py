@@ -185,11 +185,11 @@ def decoded_batches(
     field: Field, levels: list[bytes], threads: int = 1, contexts: Contexts | None = None
 ) -> Iterator[tuple[int, list[Node], int]]:
     """Decode one batch of views after another; yield the level, the views, and the bytes read so far."""
-    contexts, work = contexts or Contexts(), new_work()
+    contexts, work = contexts or Contexts(field.header.refined), new_work()
     before = stream.head_bytes(field.header, levels)
     with clock.Workers(threads) as workers:
         for level, data in enumerate(levels):
-            coder = arithmetic.reader(contexts.of(level), data)
+            coder = arithmetic.reader(contexts.of(level), data, refined=field.header.refined)
             for nodes in field.batches(level):
                 jobs, made = zip(*workers.map(field.job, nodes), strict=True)
                 blends = [code_blend(coder, 0) if job.synthesised else 0 for job in jobs]
@@ -287,6 +287,7 @@ class Source:
             dependent=not exact,
             directed=not exact,
             parted=not exact,
+            refined=not exact,
             rig=b"" if entries is None else rig.pack(entries, self.grid[0] // 2 * self.grid[1] + self.grid[1] // 2),
             steps=(),
         )
@@ -323,7 +324,7 @@ class Source:
     def coded(self, setting: float, *, forgetful: bool = False) -> tuple[bytes, Field]:
         """The payload at a quantiser, and what the decoder will make of it: all, or views that predict others."""
         field = self.field(self.header_at(setting))
-        levels = self.levels(field, Contexts(), forgetful=forgetful)
+        levels = self.levels(field, Contexts(field.header.refined), forgetful=forgetful)
         return stream.pack(field.header, levels, self.count), field
 
     def header_at(self, setting: float) -> Header:
@@ -339,7 +340,7 @@ class Source:
         trial.header = replace(header, steps=(step,) * len(header.steps))
         trial.levels = trial.levels[:TRIAL_LEVELS]
         effort, self.effort = self.effort, 0
-        self.levels(trial, Contexts())
+        self.levels(trial, Contexts(trial.header.refined))
         self.effort = effort
         errors = np.zeros(3)
         for place in np.argwhere(trial.decoded).tolist():
@@ -383,7 +384,7 @@ class Source:
         with clock.Workers(self.threads) as workers:
             for number in range(len(field.levels)):
                 room = (EXACT_BYTES if field.header.exact else VIEW_BYTES) * field.shape[0] * field.shape[1] + 1024
-                coder = arithmetic.writer(contexts.of(number), room)
+                coder = arithmetic.writer(contexts.of(number), room, refined=field.header.refined)
                 for nodes in field.batches(number):
                     costs = arithmetic.bit_costs(coder.contexts)
                     if number == 0 and self.effort and not field.header.exact and not field.past:
@@ -424,7 +425,8 @@ class Source:
         job, _ = field.job(node)
         quick = self._search(job, self._target(field, node))._replace(intra_tries=1, halvings=1)
         search.find_blocks(costs, job, quick)
-        coder = arithmetic.writer(contexts.of(node.level).copy(), VIEW_BYTES * job.levels[0].size + 1024)
+        room = VIEW_BYTES * job.levels[0].size + 1024
+        coder = arithmetic.writer(contexts.of(node.level).copy(), room, refined=field.header.refined)
         code_view(coder, job, work)
         return arithmetic.bit_costs(coder.contexts)
 

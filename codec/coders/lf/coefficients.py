@@ -13,13 +13,15 @@ import numpy as np
 
 from ii_core.base.jit import fused, part_kernel, stage_kernel, tuned_kernel
 
-from .arithmetic import bit_cost, code_bit, code_mixed, code_number, code_raw, number_cost
+from .arithmetic import REFINED, bit_cost, code_bit, code_mixed, code_number, code_of_four, code_raw, number_cost
 from .contexts import (
     ABOVE_ONE,
     ABOVE_ONE_FINE,
     ABOVE_ONE_THERE,
     ABOVE_ONE_THERE_FINE,
     ABOVE_TWO,
+    BESIDE,
+    COEFFICIENT_WEIGHTS,
     LAST,
     LAST_PARTED,
     REST,
@@ -28,6 +30,7 @@ from .contexts import (
     SIGNIFICANT_FINE,
     SIGNIFICANT_THERE,
     SIGNIFICANT_THERE_FINE,
+    TURNED,
     WEIGHTS,
 )
 from .transform import LARGEST, SCANS, sides, size_of
@@ -121,10 +124,32 @@ def _above_one_context(context, state):
     return (ABOVE_ONE if state < 2 else ABOVE_ONE_FINE) + context
 
 
+@stage_kernel
+def _beside(planes, plane, corner, y, x, h, w, near, dependent):
+    """Class 0–287 by plane, magnitudes of earlier planes at the place, any around it, and the neighbourhood."""
+    found, around = plane * 12, 0
+    if plane:
+        i, j = corner[0] + y, corner[1] + x
+        found += 3 * min(_magnitude(planes[0, i, j], dependent), 3)
+        if plane == 2:
+            found += min(_magnitude(planes[1, i, j], dependent), 2)
+        for down in range(max(y - 1, 0), min(y + 2, h)):
+            for across in range(max(x - 1, 0), min(x + 2, w)):
+                if planes[0, corner[0] + down, corner[1] + across]:
+                    around = 1
+    return (found * 2 + around) * 4 + (near if near < 2 else (2 if near < 4 else 3))
+
+
 @tuned_kernel
-def code_coefficients(coder, levels, plane, shape, intra, finer, dependent):
-    """Write or read levels[:h, :w], of which one at least is not zero; a reader finds only zeros there before."""
-    (h, w), log = sides(shape), size_of(shape)
+def code_coefficients(coder, levels, plane, shape, intra, ways, planes, corner, turn):
+    """Write or read levels[:h, :w], of which one at least is not zero; a reader finds only zeros there before.
+
+    ``ways`` say whether contexts are those of version 7, and whether the quantiser is dependent. In a refined coder
+    ``planes`` are the levels of earlier planes, the block's from a corner on, and ``turn`` is `intra.turn_class` of
+    its mode, 0 of other blocks.
+    """
+    (h, w), log, refined = sides(shape), size_of(shape), coder.state[REFINED]
+    finer, dependent = ways
     state: Any = np.int64(0)
     last = h * w - 1
     while last > 0 and _at(levels, shape, last) == 0:
@@ -139,14 +164,32 @@ def code_coefficients(coder, levels, plane, shape, intra, finer, dependent):
         context = _significant_context(plane, log, place, near, state)
         there = ((y << 2 >> shape[0]) * 4 + (x << 2 >> shape[1])) * 2 + intra
         other = _significant_there(plane, log, there, state)
-        if k < last and not code_mixed(coder, context, other, WEIGHTS + plane * 4 + log - 2, 1 if size else 0):
-            state = np.int64(NEXT[state, 0]) if dependent else state
-            continue
+        beside = turned = np.int64(0)
+        if refined:
+            beside = BESIDE + _beside(planes, plane, corner, y, x, h, w, near, dependent)
+            turned = TURNED + ((plane * 6 + turn) * 8 + min(y, 7)) * 8 + min(x, 7)
+        by_size = plane * 4 + log - 2
+        if k < last:
+            if refined:
+                third, fourth = max(state - 1, 0) * 288 + beside, max(state - 1, 0) * 1152 + turned
+                weights = COEFFICIENT_WEIGHTS + 2 * by_size
+                some = code_of_four(coder, context, other, third, fourth, weights, 1 if size else 0)
+            else:
+                some = code_mixed(coder, context, other, WEIGHTS + by_size, 1 if size else 0)
+            if not some:
+                state = np.int64(NEXT[state, 0]) if dependent else state
+                continue
         context = (plane * 8 + near) * 2 + (1 if place == 0 else 0)
         found = 1
         one = _above_one_context(context, state)
         other = (ABOVE_ONE_THERE if state < 2 else ABOVE_ONE_THERE_FINE) + plane * 32 + there
-        if code_mixed(coder, one, other, WEIGHTS + 12 + plane, 1 if size > 1 else 0):
+        if refined:
+            third, fourth = (3 + (state >> 1)) * 288 + beside, (3 + (state >> 1)) * 1152 + turned
+            weights = COEFFICIENT_WEIGHTS + 24 + 2 * plane
+            more = code_of_four(coder, one, other, third, fourth, weights, 1 if size > 1 else 0)
+        else:
+            more = code_mixed(coder, one, other, WEIGHTS + 12 + plane, 1 if size > 1 else 0)
+        if more:
             found = 2
             if code_bit(coder, ABOVE_TWO + context, 1 if size > 2 else 0):
                 rest = _rest_context(plane, around, finer)

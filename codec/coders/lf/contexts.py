@@ -70,7 +70,91 @@ TRANSFORM = SLOPE + 16  # block size 4 × (not of cosines alone, of sines alone,
 PARTED = TRANSFORM + 12  # first view, others 2 × area 6 × narrower or lower neighbours 3
 ACROSS = PARTED + 36  # form 3 × narrower above, lower to the left 3
 LAST_PARTED = ACROSS + 9  # plane 3 × area 3 × 12 digits
-COUNT = LAST_PARTED + 108
+ENDED = LAST_PARTED + 108
+# Of version 12: mixed with every other context, and with those of coefficients.
+PLAIN = (
+    *range(SPLIT, SIGNIFICANT),
+    *range(ABOVE_TWO, SIGNIFICANT_THERE),
+    *range(CROSS, SAMPLE),
+    *range(SAMPLE_ABOVE_TWO, SAMPLE_WEIGHTS),
+    *range(REST_NEAR, SIGNIFICANT_FINE),
+    *range(LIKELY, ENDED),
+)  # those of bits that are not mixed before version 12
+ELEMENTS = (
+    SPLIT,
+    SYNTHESIS,
+    INTRA,
+    INTRA_MODE,
+    MERGE,
+    DELTA,
+    SAME_MASK,
+    MASK,
+    RESIDUAL,
+    CODED,
+    LAST,
+    ABOVE_TWO,
+    REST,
+    BLEND,
+    CROSS,
+    IN_TIME,
+    MIXED,
+    VECTOR,
+    INSTANT,
+    COMPONENT,
+    RESIDUAL_IN_TIME,
+    SKIPPED,
+    SAMPLE_CODED,
+    SAMPLE_ABOVE_TWO,
+    SAMPLE_REST,
+    SAMPLE_SIGN,
+    REST_NEAR,
+    FILTERED,
+    FILTER_SAME,
+    FILTER_CLASSES,
+    TAP,
+    LIKELY,
+    UNDIRECTED,
+    SIDE,
+    STRAIGHT,
+    TURN,
+    SLOPE,
+    TRANSFORM,
+    PARTED,
+    ACROSS,
+    LAST_PARTED,
+)  # the first context of each
+HISTORY = ENDED  # element × the four bits of it before 16
+RECENT = HISTORY + 16 * len(ELEMENTS)  # plain context × the two bits of the element before 4
+# States 5 × plane 3 × earlier planes' magnitudes 12 × any around 2 × neighbourhood 4.
+BESIDE = RECENT + 4 * len(PLAIN)
+TURNED = BESIDE + 5 * 288  # states 5 × plane 3 × direction 6 × row 8 × column 8
+# Of intra modes. The class of a mode is flat, smooth, from above, from the left, or straight.
+LIKELY_NEAR = TURNED + 5 * 1152  # first, second 2 × class 5 × such modes around 4
+LIKELY_MODE = LIKELY_NEAR + 40  # first, second 2 × mode 36 × that of the block left, below 2
+LIKELY_FORM = LIKELY_MODE + 144  # first, second 2 × square, wide, tall 3 × intra neighbours 4
+UNDIRECTED_SIDES = LIKELY_FORM + 24  # sides of the two likely modes: none, above, left 3 × 3
+UNDIRECTED_FORM = UNDIRECTED_SIDES + 9  # directions around 4 × square, wide, tall 3
+UNDIRECTED_LIKE = UNDIRECTED_FORM + 12  # directions around 4 × intra neighbours 4
+SIDE_VOTES = UNDIRECTED_LIKE + 16  # votes for the left 6 × for above 6
+SIDE_FORM = SIDE_VOTES + 36  # square, wide, tall 3
+SIDE_SIDES = SIDE_FORM + 3  # as UNDIRECTED_SIDES
+STRAIGHT_SAME = SIDE_SIDES + 9  # side 2 × straight modes of this side around 5
+STRAIGHT_FORM = STRAIGHT_SAME + 10  # side 2 × square, wide, tall 3
+STRAIGHT_SIDES = STRAIGHT_FORM + 6  # side 2 × as UNDIRECTED_SIDES
+# Of whether a block has a residual.
+RESIDUAL_MODE = STRAIGHT_SIDES + 18  # kind 5 × class of the mode 5 of intra blocks × such modes around 6, else 0
+RESIDUAL_NEAR = RESIDUAL_MODE + 150  # kind 5 × residuals around 6
+RESIDUAL_FORM = RESIDUAL_NEAR + 30  # height 4 × width 4 × intra or not 2
+ELEMENT_WEIGHTS = RESIDUAL_FORM + 32  # element × (three weights; the bits before)
+COEFFICIENT_WEIGHTS = ELEMENT_WEIGHTS + 2 * len(ELEMENTS)  # those of WEIGHTS 15 × (three weights; the fourth)
+# First and second likely mode, flat or smooth, side, straight, residual 6 × (three weights; the fourth).
+MODE_WEIGHTS = COEFFICIENT_WEIGHTS + 30
+COUNT = MODE_WEIGHTS + 12
+STARTING_WEIGHTS = (45875, 13107, 13107), (22938, 22938, 16384, 9830)
+# Row of a context's element in `ELEMENTS`, and its place in `PLAIN`.
+ELEMENT_OF = np.searchsorted(ELEMENTS, np.arange(ENDED), side="right") - 1
+PLACE_OF = np.zeros(ENDED, np.int64)
+PLACE_OF[list(PLAIN)] = np.arange(len(PLAIN))
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.
@@ -158,10 +242,63 @@ PROBABILITIES = (
     65374,
 )  # of each digit, in 2^-16
 TRUSTED = 4  # bits that such a beginning counts as
+# Of version 12, that replace those before: the mean over six photographs and two scenes, at five quantisers each.
+REFINED_STARTS = (
+    "BMQPKRRSOUWXKXdfTfjfZkljDfwsWkslbjo*OQPLZTTQcVUTEH76OPLGgVUVKGCDPMMPcSZZN9INfLU*pT**3OYMNGYgMdadjJhcZgNdcWjQfh"
+    "eQRRMNJI******TQNbgZjXaRLdWakXZ****************UZ****TS********VX**ZZTU**OR****TU**WZNSacQU**LLKVfnHUepTXnwEIT"
+    "aOMVhXQZj4DOHHRZWWjol4KVRLQckbenvFUSbOWVUXfY*CQTXVXenibfj5S**VY**aZ**6GJITXc*hXa*y*y*y*y*y*t*v*r*j7kLhFbTNDfZU"
+    "9ZUV6TLXBUSiBRYeAaUlfbE0*******hljcYG0*****emmifbVG2***SgccXaULP***UUVE1*******ZbZVRD4*****ZiigbXSHE***LUWUR*U"
+    "*****VWTE3*******YdaVTE5*****ZficaVTGB***JWXTR*T*****UcYbYhfkLYXYZcejMWWXYcehQWWXZdhqRZZaZfhlKXXYaehlIVVXZbehI"
+    "UUWYbcgOZYbYkkoJWWZbefkHTWXYceiESUVWZchTjffdgggHTVYZegeLRVXYbdfMSTVWZckXaaZbhegLYXZffeeIWXaagccSMTS****UZZcbhf"
+    "fNYXbdehkHUWaZefeDTWWadaaSWXYdhkmQXZadfgjJUWYadgjCSUWZbdf*YWYYWU*VVXdVZ**SUYX*Z**RWUWY***XdYdbggeKXZZbdcaIXXYa"
+    "abaQVTW****RaabbihlNXYaaegjIUXZZdgeGUVWaYbXOYYbZkhkQWYaZfhhLUWZZcdiESVYYaed*abbWXUWPaYbZZXWMVWWUUX*AUTTU***DLF"
+    "JLNNOQQSWXacgCJELKPPTQTTaWZZcAJEMKQOTRSUaXZbdJOLONOOQQRSWVabgHMJNMQOSPUSZWabeHOJPMTNRPUSZWaafROLKLPMMQ*******R"
+    "PMLNNOQ********SPMNIUK*********FYdUZSWQSVZSXQVRUTXTXUXUUTVSVVXaYUcQWNSMMRXNTNRLOQTPSOTRRTQRQTTYWQaKUHNIFKUETCO"
+    "GHLQFQJQMQRLQORQSTQYJSRL*KMSQT*U**QL*Q*****P******ZaNVKRILVWJSGPQMVTLRTRURMPSP*Z**TYLR8KAEPT8P9NGFRRAPONUMRIRM"
+    "UOUUPVFL4D4AHM4H4EDAQO9O*K*MNI*K*U**WX*S*****U**********************ZbTWPSKNVXOTMSOPSSLTWZ*UKOSP*S**SYLTFOGGOT"
+    "FSJPOOQQJRTR*KMMTN*P*NOWEQAKJFIP9MIN*OSMLOUP*TRHUO*P*RWW*O*****F**********************HUGQFNGLGQGOFMFKHOGMGLIK"
+    "IMGLEKMOCLCHEDKJCIIENDTGMJLHSEUILKMHRIUTCMCJ9HIGCJEGJHPFLJJFOFUEKHMGUIUK**************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**************************************************************************************************************"
+    "**********************NWZ7Naz*x*S5*3Z6*3KMQPSSTWINRQTTVUJMTOSWVY********ILRORUVY********NMNPQSTWXJKPSSUTUUE**O"
+    "**T***********CSWMVVSYZ*********SNPOSTVZKJHISOTXKMKLUSXYTQRRSUUWWG**K**J**JQUKKUKRXQQQRQUVZQQNOOUTWNUPRNWUcTPL"
+    "LJEH*********JBU*************PPMN************T**VSWYbV*********QMLLORNNQU******SOKJNNMMQ*******VRMJINMMQ******"
+    "*aWQKINMMQ*******eZVPJKNMQ*******heaVQNKKP*******QMJLNNOQ********TOHLNNOQ********VQMMMNOQ********ZUPLLNOQ*****"
+    "***cYVHNNOQ********aZVTOMOQ********QLLMIUK*********UPJMIUK*********VRMLHUK*********ZVOKJUK*********bYVQHUK****"
+    "*****ZaUSLTK*********YBjY9fZ8iVggOTJRKVeXTQHP******VQQOMOU*****OPSPQUU*****************dXVRLR******YVSONP*****"
+    "*WWVRPN******JJMS********YjaeXnkmOdcdglkkQeddihljYedeYlfqOdbbahgoMbbedhkmJaYbcijnJaZdeghjNdVZVjlqFYWaafhkDUZbb"
+    "fhlDXZabdhhbibXaccdRWZWZcdfPTXYXcfeSVWXYYceWfYaYfffKZZbegfdMYXdcdccSW******UZYaZfhhPaXZchjhIVXabegcDVUXbaaaPYU"
+    "XckkjSWYaakkiJWXZbgfg9SWWaecd*h*ZWW**WVX*YZU*UVTVT***WQYWW***VfXcahggMYZZbddZMYVYacbaVXUT****PdYaajiiNWZaZeffJ"
+    "VYacedeDVYXaYZYMYUaXiikQRUcbhigMTYaafdeFTXWaacZ*f*bXUW*UXaZbYW*WTWVWX**RVWWWW**RajgbmipOeggjlnlSgfhkjllUcihqgi"
+    "eQbaVbjhnLaaeelnpLabfdkkmLcbedgjiOcZaUkkoCXXZcgjmGVbcbginFYbbbghkOYebZfccWYZZcdfiSYUYbddhSUUXYZaiVYaXbgefNaccd"
+    "gecLZYaZdccSa******TVZabghhPbZccmnfHVZbcedeCXVYYcbZPUYWcihjRVacZjjkLWaabejgAUXYcfgd**YWWW**WTcWXW**LbYR*SW*NV*"
+    "U*W**UccaZhhgLYbZacaYLZWYabbaVYU*****QZbYYhjiMZaaaeffHVZacggfDWYYZZZXLSXaYjjjQSXcbkkgKVYabfdfDSXYZcdd**YWUZX*S"
+    "ZYWWcW*SXYX*W**HTaUT***bdWXYZVVZaXXYYaYWVXXYYWWZYXXbbebWbTWTTSPVYRUSTRPVVTUTUVTVSVSYTbVQbLVLPNIPVKTHQKKRRNSPRP"
+    "QTNUPVRXWTZTWXT*QSVVY*a**TR*a*****U******ZYOQWUKNUVOSKSPTPSKS*STPXRRR*X**SWJQDMDHPS9PDMLKSQIRPMQNSLUPQP*TOVCN5"
+    "EA9HN5IAFIHPOFL*P*MNH*J*U**aX******************************bZPQUXPOUUOROSTUPQQQSTWSTRPSWT**UWPSHNHJPSCRINPPSQM"
+    "RSQ*OQMUP*P*OPVFPDLLFLPCOLK*OSNMQ*R*PML*M*Q*RdX*W*****K**********************cfbcdbYWccbabbbYaaebdaaYcYbZbZeeX"
+    "dVYVVVQWZWWWVVSZWXXYWbVZTaUbWeZTcPWNPRISWNULQPKVSSSWTbSYOZQdUdYWZNVLR*QRURY*V**MN*T*****P******YaUWTWTMXZUTVT*"
+    "PYWXXUW*UbQUV*X**UYJTBMDERV9TFOLNSSLU*P*PVN*O*P**RXDO7GK9JQ8IJCQEQQLL*O*QNL*O****VW*T*****M*******************"
+    "***ZaTWVWSRUXQUTWTQTTQXTbTWSS*S*V**VYPVMPQITUKVPP*NXRSS*U*TUM*R*Q**IX5P6GLBCP6JL9*FQOLN*N*RUN*H*S*UVW*S*****K*"
+    "*********************IULPMNPQRUUYYbdfKOJQLRQURVVZXbbfJOKPMNPVTUVYYbddNWLTKRKOLTKRJQJPKRJQJPKONQMPKQORMQJNNLNOJ"
+    "NPMRJTNPNONTKUSSMTL*O*ULRLONNOMMPLOONULROMNSMUIRNTLUL*LOTQXNTSVNQRUYRSVGPRPJSRQLRRUTUSSGMQSVTSTVS*TSWQTUU*TQUQ"
+    "RUPVYXYWVZVWYUUBI*SWcKQVQWZMQTPZd01*IUZ126HOQ13D7PSPVaJTTSXimhbQ64******loldZP3G****mrmnhfcQ5Q**VXVM0*******ae"
+    "dYVK1*****clkmfbZKC***WXVK0*******YfcZWK1*****bjkeccZGB***"
+)
+REFINED_TRUSTED = 7
 
 
-def starting_contexts() -> NDArray[np.int32]:
-    """Contexts (COUNT, 3) at the beginning of a stream: two probabilities in 2^-16, and bits seen."""
+def starting_contexts(refined: bool = False) -> NDArray[np.int32]:
+    """Contexts (COUNT, 3) at the beginning of a stream: two probabilities in 2^-16, and bits seen.
+
+    Those of version 12 are ``refined``.
+    """
     # Whole probabilities of every digit: decoders need not agree on an exponential function.
     found = np.array(
         [(*(2 * [PROBABILITIES[DIGITS.index(d)]]), TRUSTED) if d != "*" else (1 << 15, 1 << 15, 0) for d in STARTS]
@@ -170,7 +307,7 @@ def starting_contexts() -> NDArray[np.int32]:
     unknown = np.tile([1 << 15, 1 << 15, 0], (COUNT - EXACT, 1))
     contexts = np.concatenate([found, weights, unknown]).astype(np.int32)
     contexts[REST_NEAR:FILTERED] = np.repeat(contexts[REST:BLEND].reshape(3, 1, 16, 3), 6, axis=1).reshape(-1, 3)
-    contexts[LAST_PARTED:COUNT] = contexts[LAST:SIGNIFICANT].reshape(3, 4, 12, 3)[:, :3].reshape(-1, 3)
+    contexts[LAST_PARTED:ENDED] = contexts[LAST:SIGNIFICANT].reshape(3, 4, 12, 3)[:, :3].reshape(-1, 3)
     for to, of, end in (
         (SIGNIFICANT_FINE, SIGNIFICANT, ABOVE_ONE),
         (SIGNIFICANT_FINE + 384, SIGNIFICANT, ABOVE_ONE),
@@ -180,6 +317,15 @@ def starting_contexts() -> NDArray[np.int32]:
         (ABOVE_ONE_THERE_FINE, ABOVE_ONE_THERE, WEIGHTS),
     ):
         contexts[to : to + end - of] = contexts[of:end]
+    if refined:
+        known = [i for i, digit in enumerate(REFINED_STARTS) if digit != "*"]
+        starts = np.array([PROBABILITIES[DIGITS.index(REFINED_STARTS[i])] for i in known])
+        contexts[known] = np.stack([starts, starts, np.full_like(starts, REFINED_TRUSTED)], axis=1)
+    three, four = STARTING_WEIGHTS
+    contexts[ELEMENT_WEIGHTS:COEFFICIENT_WEIGHTS:2] = three
+    contexts[ELEMENT_WEIGHTS + 1 : COEFFICIENT_WEIGHTS : 2] = 0
+    contexts[COEFFICIENT_WEIGHTS:COUNT:2] = four[:3]
+    contexts[COEFFICIENT_WEIGHTS + 1 : COUNT : 2] = four[3], 0, 0
     return contexts
 
 
@@ -190,8 +336,8 @@ class Contexts:
     before: a view needs no levels beyond its own.
     """
 
-    def __init__(self) -> None:
-        self._latest, self._ended = starting_contexts(), dict[int, NDArray[np.int32]]()
+    def __init__(self, refined: bool) -> None:
+        self._latest, self._ended = starting_contexts(refined), dict[int, NDArray[np.int32]]()
 
     def of(self, level: int) -> NDArray[np.int32]:
         """Return the contexts with which a level begins; coding changes them."""

@@ -16,7 +16,15 @@ BEYOND = np.array([[64 * (i + 1) // max(slope, 1) for i in range(LARGEST)] for s
 # From version 9 on, by block size (4, 8, 16, 32): least slopes of directions that go on from a smoothed border. The
 # border draws flat, smooth and straight blocks towards it: its weight halves after 2^(fade - 1) samples.
 LEAST_SLOPES = 99, 7, 2, 1
+# By mode, for contexts of coefficients.
+TURNS = np.array([1] * 2 + [2] * 5 + [3] * 7 + [4] * 5 + [2] * 5 + [5] * 7 + [4] * 5)
 # Directions 0–16 go on from the row above by (m − 8) / 8 of a sample a row; 17–33 likewise from the column left.
+
+
+@stage_kernel
+def turn_class(mode):
+    """Class of an intra mode: 1 without a direction, 3 near straight down, 5 near straight across, 2, 4 else."""
+    return np.int64(TURNS[mode])
 
 
 @tuned_kernel

@@ -71,7 +71,7 @@ class Segment:
         """Code all instants at a quantiser, in the fractions of `coder`."""
         started = clock.cpu_seconds()
         first, *later = self.sources
-        contexts = Contexts()
+        contexts = Contexts(first.header.refined)
         field = first.field(first.header_at(setting))
         picture = stream.pack(field.header, first.levels(field, contexts), first.count)
         steps = field.header.steps if first.header.exact else first.steps(setting + COARSER * FRACTIONS)
@@ -147,7 +147,7 @@ def decoded_fields(payload: bytes, blank: IIPicture, options: Options, instants:
         If the payload is damaged.
     """
     past_count, found = _opened(payload, blank, instants)
-    contexts, past = Contexts(), list[Field]()
+    contexts, past = Contexts(found[0].header.refined), list[Field]()
     for number, instant in enumerate(found):
         field = _field(instant, blank, past)
         for _ in _batches(field, instant, options, contexts, number):
@@ -169,7 +169,7 @@ def decode_view(
         If the payload is damaged so far as it is read.
     """
     past_count, found = _opened(payload, blank, instants)
-    contexts, past, views = Contexts(), list[Field](), 0
+    contexts, past, views = Contexts(found[0].header.refined), list[Field](), 0
     for number, instant in enumerate(found[: at + 1]):
         field = _field(instant, blank, past)
         last = next(i for i, level in enumerate(field.levels) if place in [(node.row, node.col) for node in level])

@@ -14,11 +14,11 @@ from .planes import bt709_colours
 
 # Versions 2, 3, 5 and 6 say by their number which tools they have: factors between planes, and residuals without a
 # transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent quantiser as well,
-# version 9 other intra modes, too, version 10 halved blocks, version 11 views beside their places. It is written for
-# these alone; lossless coding still writes 2 and 3.
+# version 9 other intra modes, too, version 10 halved blocks, version 11 views beside their places, version 12 bits of
+# more contexts. Lossless coding still writes 2 and 3.
 VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED = 3, 2, 5, 6
-TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED = 7, 8, 9, 10, 11
-FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED
+TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED = 7, 8, 9, 10, 11, 12
+FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED
 _VERSIONS = {
     (False, False): UNCROSSED,
     (True, False): VERSION,
@@ -27,7 +27,7 @@ _VERSIONS = {
 }
 _TOOLS = {version: tools for tools, version in _VERSIONS.items()}
 QUARTERS, EIGHTHS = 2, 3  # binary logarithms of the unit of factors between planes
-# Flags of versions 7 to 11; the lowest two bits are 0, or the logarithm of the factors' unit.
+# Flags of versions 7 to 12; the lowest two bits are 0, or the logarithm of the factors' unit.
 _SKIPS, _FILTERS, _DOWN, _BT709, _SKEWED, _RIGGED = 4, 8, 16, 32, 64, 128
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
@@ -73,17 +73,19 @@ class Header:
     skipping : bool
         Whether small blocks may have a residual without a transform.
     tuned : bool
-        Versions 7 to 11: large coefficients have contexts by their neighbourhood, and views may be filtered.
+        Versions 7 to 12: large coefficients have contexts by their neighbourhood, and views may be filtered.
     filtered : bool
         Whether views may be filtered in the loop.
     dependent : bool
-        Versions 8 to 11: the quantiser of coefficients is a dependent one.
+        Versions 8 to 12: the quantiser of coefficients is a dependent one.
     directed : bool
-        Versions 9 to 11: intra blocks smooth borders, have contexts of directions, and transforms of sines.
+        Versions 9 to 12: intra blocks smooth borders, have contexts of directions, and transforms of sines.
     parted : bool
-        Versions 10 and 11: squares of blocks may be halved.
+        Versions 10 to 12: squares of blocks may be halved.
+    refined : bool
+        Version 12: all bits with contexts are mixed, those of coefficients of more contexts.
     rig : bytes
-        Version 11: departures of views from their places on the lattice, as `rig` packs them; empty without any.
+        Versions 11 and 12: departures of views from their places on the lattice, as `rig` packs them; may be empty.
     steps : tuple of int
         The quantiser's step of each level, in 2^-7 of an 8-bit code.
     """
@@ -103,6 +105,7 @@ class Header:
     dependent: bool = False
     directed: bool = False
     parted: bool = False
+    refined: bool = False
     rig: bytes = b""
     steps: tuple[int, ...]
 
@@ -124,7 +127,7 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
     flags |= _DOWN * (header.lattice[2] < 0) | _BT709 * (header.scales is not None) | _SKEWED * _skewed(header)
     flags |= _RIGGED * bool(header.rig)
     head = _TUNED.pack(
-        FLAGGED[header.dependent + header.directed + header.parted + bool(header.rig)],
+        REFINED if header.refined else FLAGGED[header.dependent + header.directed + header.parted + bool(header.rig)],
         flags,
         header.log_stride | header.sources << 3,
         header.low,
@@ -245,6 +248,7 @@ def _read_tuned(payload: bytes) -> _Read:
         "dependent": version >= DEPENDENT,
         "directed": version >= DIRECTED,
         "parted": version >= PARTED,
+        "refined": version >= REFINED,
         "rig": rig,
     }
     return values, index, at
