@@ -1,0 +1,146 @@
+"""Nearest faces of camera rays that are parallel from lens to lens: views, rasterised instead of traced.
+
+Embree takes 30–60 ns for a camera ray of a picture of 512×256 lenses, and some 900 in hair. The rays of one place
+under all lenses are parallel where a camera is even, and stand on a lattice: `kernels.raster` finds their nearest
+faces as a renderer of triangles does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernels.lanes import BLOCK, aligned
+from .kernels.raster import CHUNK, GROUP, OFFSET, ROOM, SLOPE, draw_faces, list_faces, take_faces
+
+# Largest deviation of an even camera's rays: of origins in lens pitches, of directions in lengths of a ray a lens.
+EVEN_PLACE, EVEN_WAY = 1e-7, 1e-11
+_SPARE = 3  # chunks behind a line of the buffer: lines of a power of two would share few places of the cache
+_NOWHERE = 1e12  # lens pitches off: of views that fill up a room
+
+Floats = NDArray[np.float64]
+
+
+class Views(NamedTuple):
+    """Camera rays as views: offsets and slopes of columns (across) and rows (down) of a lens, see `kernels.raster`.
+
+    ``turn`` (12,) leads from the scene's millimetres to lenses across and down and lengths of a ray.
+    """
+
+    across: Floats
+    down: Floats
+    places: tuple[int, int]
+    lenses: tuple[int, int]
+    turn: Floats
+
+
+def parallel_views(rays: tuple[Floats, ...], lenses: tuple[int, int], pose: Floats) -> Views | None:
+    """Return the views of a camera; None if its rays of one place are not parallel, or off an even lattice.
+
+    Parameters
+    ----------
+    rays : tuple of ndarray
+        Those of `IICamera.separable_rays`.
+    lenses : (int, int)
+        Lenses across and down.
+    pose : (4, 4) float
+        Rigid transform from the camera's frame to the scene's.
+    """
+    x, y, (start, ahead) = rays
+    rooms, places, turn = [], [], np.empty((3, 4))
+    for axis, (coordinates, count) in enumerate(zip((x, y), lenses, strict=True)):
+        if count < 2 or len(coordinates) % count or not ahead:
+            return None
+        table = coordinates.reshape(count, -1, 2)
+        first, pitch = table[0], (table[-1, :, 0] - table[0, :, 0]).mean() / (count - 1)
+        even = first[:, 0] + pitch * np.arange(count)[:, None]
+        if not (
+            np.abs(table[:, :, 0] - even).max() <= EVEN_PLACE * abs(pitch)
+            and np.abs(table[:, :, 1] - first[:, 1]).max() <= EVEN_WAY * abs(ahead)
+            and pitch
+        ):
+            return None
+        room = np.zeros((-(-len(first) // BLOCK), ROOM // BLOCK, BLOCK))
+        of_views = np.full((2, room.shape[0] * BLOCK), [[_NOWHERE], [0.0]])
+        of_views[:, : len(first)] = first[:, 0] / pitch, first[:, 1] / pitch
+        room[:, [OFFSET // BLOCK, SLOPE // BLOCK]] = of_views.reshape(2, -1, BLOCK).swapaxes(0, 1)
+        rooms.append(room.reshape(-1))
+        places.append(len(first))
+        turn[axis] = _row(pose, axis, 0.0, pitch)
+    turn[2] = _row(pose, 2, start, ahead)
+    return Views(rooms[0], rooms[1], (places[0], places[1]), lenses, turn.reshape(-1))
+
+
+def _row(pose: Floats, axis: int, start: float, unit: float) -> Floats:
+    """Return what leads from the scene's coordinates to the camera's along an axis, from a start, in a unit."""
+    way = pose[:3, axis]
+    return np.append(way, -(way @ pose[:3, 3]) - start) / unit
+
+
+class Raster:
+    """Nearest faces of the rays of a picture, found view by view.
+
+    Parameters
+    ----------
+    views : Views
+    corners : (F, 3, 3) float32
+        Of faces, in mm.
+    first_of_same : (F,) or (0,) int32
+        The face that counts of those in the same place.
+    """
+
+    def __init__(self, views: Views, corners: NDArray[np.float32], first_of_same: NDArray[np.int32]) -> None:
+        self.views = views
+        self.corners = corners.reshape(-1)
+        self._first_of_same = first_of_same
+        self._views_down = len(views.down) // ROOM * BLOCK
+        groups = -(-views.lenses[1] // GROUP)
+        ends = np.zeros(groups * self._views_down, np.int64)
+        self.rows, self.boxes = self._list(ends, np.empty(0, np.int32), np.empty(0, np.uint8))
+        # CPU time beside others, all scenes at scales 1–8 of setup1, 2026-11-26
+        rays = math.prod(views.places) * math.prod(views.lenses)
+        self.pays = True
+        if self.pays:
+            self._starts = np.append(0, np.cumsum(ends))
+            count = max(int(self._starts[-1]), 1)
+            self._faces, self._spans = np.empty(count, np.int32), np.empty(count, np.uint8)
+            self._list(self._starts[:-1].copy(), self._faces, self._spans)
+
+    def _list(self, places: NDArray[np.int64], faces: NDArray[np.int32], spans: NDArray[np.uint8]) -> tuple[int, int]:
+        views, counts = self.views, np.zeros(2, np.int64)
+        list_faces(
+            self.corners, self._first_of_same, views.turn, views.across.copy(), views.down.copy(), views.lenses,
+            places, faces, spans, counts,
+        )  # fmt: skip
+        return int(counts[0]), int(counts[1])
+
+    def faces(self, rows: slice) -> NDArray[np.int32]:
+        """Return the nearest face of each pixel in some rows, (rows, columns); −1 where there is none."""
+        (columns, down), (wide, high) = self.views.places, self.views.lenses
+        top, bottom = rows.start // down, -(-rows.stop // down)
+        out = np.empty((bottom - top, down, wide * columns), np.int32)
+        across, chosen = self.views.across.copy(), np.empty(BLOCK + 1, np.int64)
+        offsets, slopes = (
+            self.views.down.reshape(-1, ROOM // BLOCK, BLOCK)[:, part // BLOCK].reshape(-1) for part in (OFFSET, SLOPE)
+        )
+        stride = CHUNK * (-(-wide // BLOCK) + _SPARE)
+        lines = len(across) // ROOM * BLOCK * stride
+        buffer = aligned(min(GROUP, bottom - top) * lines)
+        chunks = buffer.reshape(-1, 2, BLOCK)
+        chunks[:, 0], chunks.view(np.int32)[:, 1] = np.inf, -1
+        for group in range(top // GROUP, (bottom - 1) // GROUP + 1):
+            start = group * GROUP
+            some = max(top - start, 0), min(bottom - start, GROUP)
+            for v in range(down):
+                of_list = slice(*self._starts[group * self._views_down + v :][:2])
+                for i, room in enumerate(across.reshape(-1, ROOM)):
+                    draw_faces(
+                        self.corners, self.views.turn, self._faces[of_list], self._spans[of_list], some, start,
+                        (offsets[v], slopes[v]), room, wide, chosen, i * BLOCK * stride, lines, stride, buffer,
+                    )  # fmt: skip
+                into = out[start + some[0] - top : start + some[1] - top, v]
+                take_faces(buffer, buffer.view(np.int32), wide, stride, columns, into)
+        return out.reshape(-1, wide * columns)[rows.start - top * down :][: rows.stop - rows.start]
