@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .kernels.lanes import BLOCK, aligned
-from .kernels.raster import CHUNK, GROUP, OFFSET, ROOM, SLOPE, draw_faces, list_faces, take_faces
+from .kernels.raster import CHUNK, GROUP, LENSES, OFFSET, ROOM, SLOPE, draw_faces, list_faces, take_faces
 
 # Largest deviation of an even camera's rays: of origins in lens pitches, of directions in lengths of a ray a lens.
 EVEN_PLACE, EVEN_WAY = 1e-7, 1e-11
-_SPARE = 3  # chunks behind a line of the buffer: lines of a power of two would share few places of the cache
+_SPARE = 6  # chunks behind a line of the buffer: lines of a power of two would share few places of the cache
 _NOWHERE = 1e12  # lens pitches off: of views that fill up a room
 
 Floats = NDArray[np.float64]
@@ -126,10 +126,10 @@ class Raster:
         offsets, slopes = (
             self.views.down.reshape(-1, ROOM // BLOCK, BLOCK)[:, part // BLOCK].reshape(-1) for part in (OFFSET, SLOPE)
         )
-        stride = CHUNK * (-(-wide // BLOCK) + _SPARE)
+        stride = CHUNK * (-(-wide // LENSES) + _SPARE)
         lines = len(across) // ROOM * BLOCK * stride
         buffer = aligned(min(GROUP, bottom - top) * lines)
-        chunks = buffer.reshape(-1, 2, BLOCK)
+        chunks = buffer.reshape(-1, 2, LENSES)
         chunks[:, 0], chunks.view(np.int32)[:, 1] = np.inf, -1
         for group in range(top // GROUP, (bottom - 1) // GROUP + 1):
             start = group * GROUP

@@ -22,7 +22,8 @@ from .lanes import BLOCK, single_of
 
 SLACK = 1e-9  # lens pitches: far more than the rounding of float64, far less than that of Embree's float32 rays
 GROUP = 16  # rows of lenses whose faces are listed together: the rows that a face spans take four bits each
-CHUNK = 2 * BLOCK  # of a line of the buffer: distances of the faces nearest in 16 lenses, then which they are
+LENSES = 8  # lie together in a line of the buffer: the distances of the faces nearest in them, then which these are
+CHUNK = 2 * LENSES
 # A room for the views of 16 columns (or rows) of a lens: offset and slope; first and last lens of a line; distance of
 # the line in lens 0, and its step from lens to lens.
 OFFSET, SLOPE, FIRST, LAST, DISTANCE, STEP = range(0, 6 * BLOCK, BLOCK)
@@ -157,29 +158,20 @@ def draw(a, b, face, room, chosen, line, stride, buffer):
         first, last = np.int64(room[np.uint64(FIRST + k)]), np.int64(room[np.uint64(LAST + k)])
         distance, step = room[np.uint64(DISTANCE + k)], room[np.uint64(STEP + k)]
         single_step = np.float32(step)
-        lens = first & -BLOCK
+        lens = first & -LENSES
         place = np.uint64(line + k * stride + 2 * lens)
-        if first == last:
-            here = min(max(np.float32(distance + first * step), near), far)
-            distances = place + np.uint64(first - lens)
-            which = distances + np.uint64(BLOCK)
-            before, its = buffer[distances], buffer[which]
-            nearer = here < before
-            buffer[distances] = here if nearer else before
-            buffer[which] = own if nearer else its
-            continue
         while lens <= last:
             start = np.float32(distance + lens * step)
             low, high = np.float32(first - lens), np.float32(last - lens)
-            for j in range(BLOCK):
+            for j in range(LENSES):
                 lane = np.float32(np.int32(j))
                 here = min(max(start + lane * single_step, near), far)
-                distances, which = place + np.uint64(j), place + np.uint64(j + BLOCK)
+                distances, which = place + np.uint64(j), place + np.uint64(j + LENSES)
                 before, its = buffer[distances], buffer[which]
                 nearer = (here < before) & (lane >= low) & (lane <= high)
                 buffer[distances] = here if nearer else before
                 buffer[which] = own if nearer else its
-            lens += BLOCK
+            lens += LENSES
             place += np.uint64(CHUNK)
 
 
@@ -222,11 +214,11 @@ def take_faces(buffer, bits, lenses, stride, columns, out):
     """Move the faces of a buffer to pixels ``out`` of rows of views, and empty it."""
     lines = stride * ((columns + BLOCK - 1) // BLOCK * BLOCK)
     for row in range(out.shape[0]):
-        for first in range(0, lenses, BLOCK):
+        for first in range(0, lenses, LENSES):
             for u in range(columns):
                 place = row * lines + u * stride + 2 * first
-                for j in range(min(BLOCK, lenses - first)):
-                    out[row, (first + j) * columns + u] = bits[place + BLOCK + j]
-                for j in range(BLOCK):
+                for j in range(min(LENSES, lenses - first)):
+                    out[row, (first + j) * columns + u] = bits[place + LENSES + j]
+                for j in range(LENSES):
                     buffer[place + j] = _FAR
-                    bits[place + BLOCK + j] = _MISS
+                    bits[place + LENSES + j] = _MISS
