@@ -21,6 +21,11 @@ EVEN_PLACE, EVEN_WAY = 1e-7, 1e-11
 _SPARE = 6  # chunks behind a line of the buffer: lines of a power of two would share few places of the cache
 _NOWHERE = 1e12  # lens pitches off: of views that fill up a room
 
+# Costs in rows of faces, each drawn in all views of a row of lenses in 100 ns. A face that is looked at takes 80 ns;
+# Embree takes 110 ns for a ray where packets spread, and 1.3 ns more for each face whose box in the view the ray
+# meets: 1200 in hair (CPU time of eight scenes at scales 2–16 of setup1, beside other jobs, 2026-11-26).
+ROWS_OF_FACE, MOST_ROWS, ROWS_OF_BOX = 0.8, 1.1, 0.013
+
 Floats = NDArray[np.float64]
 
 
@@ -83,6 +88,9 @@ def _row(pose: Floats, axis: int, start: float, unit: float) -> Floats:
 class Raster:
     """Nearest faces of the rays of a picture, found view by view.
 
+    `pays` tells whether that is faster than to trace them, from counts alone: the same on every machine. Only then
+    can it return `faces`.
+
     Parameters
     ----------
     views : Views
@@ -93,16 +101,16 @@ class Raster:
     """
 
     def __init__(self, views: Views, corners: NDArray[np.float32], first_of_same: NDArray[np.int32]) -> None:
-        self.views = views
-        self.corners = corners.reshape(-1)
-        self._first_of_same = first_of_same
+        self.views, self._corners, self._first_of_same = views, corners.reshape(-1), first_of_same
+        rays, (columns, _) = math.prod(views.lenses) * math.prod(views.places), views.places
+        self.pays = ROWS_OF_FACE * len(corners) <= MOST_ROWS * rays
+        if not self.pays:
+            return
         self._views_down = len(views.down) // ROOM * BLOCK
-        groups = -(-views.lenses[1] // GROUP)
-        ends = np.zeros(groups * self._views_down, np.int64)
-        self.rows, self.boxes = self._list(ends, np.empty(0, np.int32), np.empty(0, np.uint8))
-        # CPU time beside others, all scenes at scales 1–8 of setup1, 2026-11-26
-        rays = math.prod(views.places) * math.prod(views.lenses)
-        self.pays = True
+        ends = np.zeros(-(-views.lenses[1] // GROUP) * self._views_down, np.int64)
+        rows, boxes = self._list(ends, np.empty(0, np.int32), np.empty(0, np.uint8))
+        rows *= len(views.across) // ROOM
+        self.pays = rows + ROWS_OF_FACE * len(corners) <= MOST_ROWS * rays + ROWS_OF_BOX * boxes * columns
         if self.pays:
             self._starts = np.append(0, np.cumsum(ends))
             count = max(int(self._starts[-1]), 1)
@@ -112,20 +120,19 @@ class Raster:
     def _list(self, places: NDArray[np.int64], faces: NDArray[np.int32], spans: NDArray[np.uint8]) -> tuple[int, int]:
         views, counts = self.views, np.zeros(2, np.int64)
         list_faces(
-            self.corners, self._first_of_same, views.turn, views.across.copy(), views.down.copy(), views.lenses,
+            self._corners, self._first_of_same, views.turn, views.across.copy(), views.down.copy(), views.lenses,
             places, faces, spans, counts,
         )  # fmt: skip
         return int(counts[0]), int(counts[1])
 
     def faces(self, rows: slice) -> NDArray[np.int32]:
         """Return the nearest face of each pixel in some rows, (rows, columns); −1 where there is none."""
-        (columns, down), (wide, high) = self.views.places, self.views.lenses
+        (columns, down), wide = self.views.places, self.views.lenses[0]
         top, bottom = rows.start // down, -(-rows.stop // down)
         out = np.empty((bottom - top, down, wide * columns), np.int32)
         across, chosen = self.views.across.copy(), np.empty(BLOCK + 1, np.int64)
-        offsets, slopes = (
-            self.views.down.reshape(-1, ROOM // BLOCK, BLOCK)[:, part // BLOCK].reshape(-1) for part in (OFFSET, SLOPE)
-        )
+        of_rows = self.views.down.reshape(-1, ROOM // BLOCK, BLOCK)
+        offsets, slopes = (of_rows[:, part // BLOCK].reshape(-1) for part in (OFFSET, SLOPE))
         stride = CHUNK * (-(-wide // LENSES) + _SPARE)
         lines = len(across) // ROOM * BLOCK * stride
         buffer = aligned(min(GROUP, bottom - top) * lines)
@@ -138,7 +145,7 @@ class Raster:
                 of_list = slice(*self._starts[group * self._views_down + v :][:2])
                 for i, room in enumerate(across.reshape(-1, ROOM)):
                     draw_faces(
-                        self.corners, self.views.turn, self._faces[of_list], self._spans[of_list], some, start,
+                        self._corners, self.views.turn, self._faces[of_list], self._spans[of_list], some, start,
                         (offsets[v], slopes[v]), room, wide, chosen, i * BLOCK * stride, lines, stride, buffer,
                     )  # fmt: skip
                 into = out[start + some[0] - top : start + some[1] - top, v]

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, lane_kernel, lane_stage
+from ii_core.base.jit import lane_kernel, lane_stage
 
 from .lanes import BLOCK, single_of
 
@@ -31,7 +31,7 @@ ROOM = 6 * BLOCK
 _FAR, _MISS = np.float32(math.inf), np.int32(-1)
 
 
-@inline_kernel
+@lane_stage
 def seen(corners, i, turn):
     """Coordinates x, y, s of a corner, the numbers from i on, by a matrix of three rows of four."""
     a = np.float64(corners[np.uint64(i)])
@@ -96,12 +96,14 @@ def list_faces(corners, first_of_same, turn, across, down, lenses, places, faces
                     place = places[list_]
                     places[list_] = place + 1
                     if faces.shape[0] > 0:
-                        top = GROUP * group
+                        top, bottom = GROUP * group, GROUP * group + GROUP - 1
                         faces[place] = f
-                        spans[place] = max(first - top, 0) + 16 * min(last - top, GROUP - 1)
+                        spans[place] = (first - top if first > top else 0) + 16 * (
+                            (last if last < bottom else bottom) - top
+                        )
 
 
-@inline_kernel
+@lane_stage
 def cut(y, x0, y0, s0, x1, y1, s1, x2, y2, s2):
     """Ends (x, s) of the line in which a plane cuts a face: on the longest edge, and on one of the others.
 
@@ -118,7 +120,7 @@ def cut(y, x0, y0, s0, x1, y1, s1, x2, y2, s2):
     return ax, a, (1.0 - t) * px + t * qx, (1.0 - t) * p + t * q
 
 
-@inline_kernel
+@lane_stage
 def before_lenses(ax, a, bx, b):
     """The part of a line, of which one end lies before the lenses, that lies behind them, or on them."""
     t = a / (a - b)
