@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -125,8 +126,7 @@ class Job:
         """
         if self._views is not None:
             return list(strips(self.camera, TILE_RAYS))
-        whole = not isinstance(self.sampling, int) or "coverage" in self.support
-        return list(tiles(self.camera, TILE_RAYS, whole_lenses=whole))
+        return list(self._parts_of())
 
     def stop(self) -> None:
         """Make all threads of this process leave their tiles after the current sample."""
@@ -143,12 +143,17 @@ class Job:
             block = _merged([job.tile(rows, cols) for job in self._channels])
         elif self._views is not None:
             self._local.strip = rows.start, self._strip(rows)
-            block = _joined(rows, cols, [self._tile(*part) for part in tiles(self.camera, TILE_RAYS, (rows, cols))])
+            block = _joined(rows, cols, [self._tile(*part) for part in self._parts_of((rows, cols))])
         else:
             block = self._tile(rows, cols)
         if self.audit:
             audit = self._audited(rows, cols, block.arrays["pixels"])
         return replace(block, audit=audit, cpu_seconds=time.thread_time() - started)
+
+    def _parts_of(self, block: Tile | None = None) -> Iterator[Tile]:
+        """Return the parts of the picture, or of a block of it, that are traced at once."""
+        whole = not isinstance(self.sampling, int) or "coverage" in self.support
+        return tiles(self.camera, TILE_RAYS, block, whole_lenses=whole)
 
     def _tile(self, rows: slice, cols: slice) -> Block:
         tracer = self._tracer()

@@ -8,13 +8,14 @@ faces as a renderer of triangles does.
 from __future__ import annotations
 
 import math
+import threading
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .kernels.lanes import BLOCK, aligned
-from .kernels.raster import CHUNK, GROUP, LENSES, OFFSET, ROOM, SLOPE, draw_faces, list_faces, take_faces
+from .kernels.raster import CHUNK, GROUP, LENSES, MOST_FACES, OFFSET, ROOM, SLOPE, draw_faces, list_faces, take_faces
 
 # Largest deviation of an even camera's rays: of origins in lens pitches, of directions in lengths of a ray a lens.
 EVEN_PLACE, EVEN_WAY = 1e-7, 1e-11
@@ -103,27 +104,45 @@ class Raster:
     def __init__(self, views: Views, corners: NDArray[np.float32], first_of_same: NDArray[np.int32]) -> None:
         self.views, self._corners, self._first_of_same = views, corners.reshape(-1), first_of_same
         rays, (columns, _) = math.prod(views.lenses) * math.prod(views.places), views.places
-        self.pays = ROWS_OF_FACE * len(corners) <= MOST_ROWS * rays
+        self.pays = len(corners) < MOST_FACES and ROWS_OF_FACE * len(corners) <= MOST_ROWS * rays
         if not self.pays:
             return
-        self._views_down = len(views.down) // ROOM * BLOCK
-        ends = np.zeros(-(-views.lenses[1] // GROUP) * self._views_down, np.int64)
-        rows, boxes = self._list(ends, np.empty(0, np.int32), np.empty(0, np.uint8))
+        self._groups, self._views_down = -(-views.lenses[1] // GROUP), len(views.down) // ROOM * BLOCK
+        self._ends = np.zeros(self._groups * self._views_down, np.int64)
+        rows, boxes = self._list(self._ends, np.empty(0, np.uint32))
         rows *= len(views.across) // ROOM
         self.pays = rows + ROWS_OF_FACE * len(corners) <= MOST_ROWS * rays + ROWS_OF_BOX * boxes * columns
-        if self.pays:
-            self._starts = np.append(0, np.cumsum(ends))
-            count = max(int(self._starts[-1]), 1)
-            self._faces, self._spans = np.empty(count, np.int32), np.empty(count, np.uint8)
-            self._list(self._starts[:-1].copy(), self._faces, self._spans)
+        self._lists: dict[int, NDArray[np.uint32]] = {}
+        self._unseen = dict.fromkeys(range(self._groups), 0)
+        self._lock = threading.Lock()
 
-    def _list(self, places: NDArray[np.int64], faces: NDArray[np.int32], spans: NDArray[np.uint8]) -> tuple[int, int]:
+    def _list(self, places: NDArray[np.int64], entries: NDArray[np.uint32]) -> tuple[int, int]:
         views, counts = self.views, np.zeros(2, np.int64)
         list_faces(
             self._corners, self._first_of_same, views.turn, views.across.copy(), views.down.copy(), views.lenses,
-            places, faces, spans, counts,
+            places, entries, counts,
         )  # fmt: skip
         return int(counts[0]), int(counts[1])
+
+    def _entries(self, group: int) -> NDArray[np.uint32]:
+        """Return the lists of a group of rows of lenses, one after the other; all are made when one is missing."""
+        with self._lock:
+            if group not in self._lists:
+                starts = np.append(0, np.cumsum(self._ends))
+                every = np.empty(max(int(starts[-1]), 1), np.uint32)
+                self._list(starts[:-1].copy(), every)
+                of_groups = starts[:: self._views_down]
+                for i in range(self._groups):  # copies can be let go one by one
+                    self._lists[i] = every[of_groups[i] : of_groups[i + 1]].copy()
+                    self._unseen[i] = min(self.views.lenses[1] - i * GROUP, GROUP)
+            return self._lists[group]
+
+    def _used(self, group: int, rows: int) -> None:
+        """Let go of the lists of a group after all its rows: the picture takes their memory."""
+        with self._lock:
+            self._unseen[group] -= rows
+            if self._unseen[group] <= 0:
+                self._lists.pop(group, None)
 
     def faces(self, rows: slice) -> NDArray[np.int32]:
         """Return the nearest face of each pixel in some rows, (rows, columns); −1 where there is none."""
@@ -141,13 +160,15 @@ class Raster:
         for group in range(top // GROUP, (bottom - 1) // GROUP + 1):
             start = group * GROUP
             some = max(top - start, 0), min(bottom - start, GROUP)
+            entries, lengths = self._entries(group), self._ends.reshape(self._groups, -1)[group]
             for v in range(down):
-                of_list = slice(*self._starts[group * self._views_down + v :][:2])
+                of_list = slice(lengths[:v].sum(), lengths[: v + 1].sum())
                 for i, room in enumerate(across.reshape(-1, ROOM)):
                     draw_faces(
-                        self._corners, self.views.turn, self._faces[of_list], self._spans[of_list], some, start,
+                        self._corners, self.views.turn, entries[of_list], some, start,
                         (offsets[v], slopes[v]), room, wide, chosen, i * BLOCK * stride, lines, stride, buffer,
                     )  # fmt: skip
                 into = out[start + some[0] - top : start + some[1] - top, v]
                 take_faces(buffer, buffer.view(np.int32), wide, stride, columns, into)
+            self._used(group, some[1] - some[0])
         return out.reshape(-1, wide * columns)[rows.start - top * down :][: rows.stop - rows.start]

@@ -21,7 +21,10 @@ from ii_core.base.jit import lane_kernel, lane_stage
 from .lanes import BLOCK, single_of
 
 SLACK = 1e-9  # lens pitches: far more than the rounding of float64, far less than that of Embree's float32 rays
-GROUP = 16  # rows of lenses whose faces are listed together: the rows that a face spans take four bits each
+GROUP = 16  # rows of lenses whose faces are listed together
+# An entry of a list: the first and the last row of its group that may see a face, in four bits each, and the face.
+ROW_BITS, ROW_MASK = 4, 15
+MOST_FACES = 1 << 24
 LENSES = 8  # lie together in a line of the buffer: the distances of the faces nearest in them, then which these are
 CHUNK = 2 * LENSES
 # A room for the views of 16 columns (or rows) of a lens: offset and slope; first and last lens of a line; distance of
@@ -58,13 +61,12 @@ def lens_ranges(x0, s0, x1, s1, x2, s2, most, room):
 
 
 @lane_kernel
-def list_faces(corners, first_of_same, turn, across, down, lenses, places, faces, spans, counts):
+def list_faces(corners, first_of_same, turn, across, down, lenses, places, entries, counts):
     """Count or list the faces that the rays of a group of rows of lenses may meet in each row of views.
 
-    ``places`` has the next place of each list in ``faces`` and ``spans``, for each group and row of views, which
-    moves on. A span is the first row of the group that may see the face, and sixteen times the last. With ``faces``
-    of no rows, faces are counted only, and ``counts`` gets the rows of all spans and the rays of one view that lie
-    in a box around a face.
+    ``places`` has the next place of each list in ``entries``, for each group and row of views, which moves on. With
+    ``entries`` of no rows, faces are counted only. ``counts`` gets the rows of all entries, and the rays of one
+    column of views that lie in a box around a face.
     """
     views = down.shape[0] // ROOM * BLOCK
     middle = across.shape[0] // ROOM // 2 * ROOM + BLOCK // 2 - 1
@@ -95,12 +97,10 @@ def list_faces(corners, first_of_same, turn, across, down, lenses, places, faces
                     list_ = group * views + view
                     place = places[list_]
                     places[list_] = place + 1
-                    if faces.shape[0] > 0:
+                    if entries.shape[0] > 0:
                         top, bottom = GROUP * group, GROUP * group + GROUP - 1
-                        faces[place] = f
-                        spans[place] = (first - top if first > top else 0) + 16 * (
-                            (last if last < bottom else bottom) - top
-                        )
+                        low, high = first - top if first > top else 0, (last if last < bottom else bottom) - top
+                        entries[place] = ((f << ROW_BITS | high) << ROW_BITS) | low
 
 
 @lane_stage
@@ -178,17 +178,18 @@ def draw(a, b, face, room, chosen, line, stride, buffer):
 
 
 @lane_kernel
-def draw_faces(corners, turn, faces, spans, rows, top, view, room, lenses, chosen, line, lines, stride, buffer):
+def draw_faces(corners, turn, entries, rows, top, view, room, lenses, chosen, line, lines, stride, buffer):
     """Enter faces in the lines of a buffer: one for each of some ``rows`` of lenses of a group, and each column.
 
     The group starts at row ``top``; ``view`` is offset and slope of the row of views. Lines are ``stride`` numbers
     long, and so many ``lines`` of them a row; those of the room start at ``line``.
     """
-    for i in range(faces.shape[0]):
-        first, last = max(np.int64(spans[i]) & 15, rows[0]), min(np.int64(spans[i]) >> 4, rows[1] - 1)
+    for i in range(entries.shape[0]):
+        entry = np.int64(entries[i])
+        first, last = max(entry & ROW_MASK, rows[0]), min(entry >> ROW_BITS & ROW_MASK, rows[1] - 1)
         if first > last:
             continue
-        f = np.int64(faces[i])
+        f = entry >> 2 * ROW_BITS
         x0, y0, s0 = seen(corners, 9 * f, turn)
         x1, y1, s1 = seen(corners, 9 * f + 3, turn)
         x2, y2, s2 = seen(corners, 9 * f + 6, turn)
