@@ -8,6 +8,7 @@ faces as a renderer of triangles does.
 from __future__ import annotations
 
 import math
+import mmap
 import threading
 from typing import NamedTuple
 
@@ -86,6 +87,11 @@ def _row(pose: Floats, axis: int, start: float, unit: float) -> Floats:
     return np.append(way, -(way @ pose[:3, 3]) - start) / unit
 
 
+def _pages(count: int) -> NDArray[np.uint32]:
+    """Return room for numbers that goes back to the system, not to the heap, when it is let go."""
+    return np.frombuffer(mmap.mmap(-1, 4 * max(count, 1)), np.uint32)
+
+
 class Raster:
     """Nearest faces of the rays of a picture, found view by view.
 
@@ -129,12 +135,13 @@ class Raster:
         with self._lock:
             if group not in self._lists:
                 starts = np.append(0, np.cumsum(self._ends))
-                every = np.empty(max(int(starts[-1]), 1), np.uint32)
+                every = _pages(int(starts[-1]))
                 self._list(starts[:-1].copy(), every)
                 of_groups = starts[:: self._views_down]
-                for i in range(self._groups):  # copies can be let go one by one
-                    self._lists[i] = every[of_groups[i] : of_groups[i + 1]].copy()
-                    self._unseen[i] = min(self.views.lenses[1] - i * GROUP, GROUP)
+                for i in range(self._groups):
+                    own = _pages(int(of_groups[i + 1] - of_groups[i]))
+                    own[: of_groups[i + 1] - of_groups[i]] = every[of_groups[i] : of_groups[i + 1]]
+                    self._lists[i], self._unseen[i] = own, min(self.views.lenses[1] - i * GROUP, GROUP)
             return self._lists[group]
 
     def _used(self, group: int, rows: int) -> None:
