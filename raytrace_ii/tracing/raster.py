@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .kernels.lanes import BLOCK, aligned
-from .kernels.raster import CHUNK, GROUP, LENSES, MOST_FACES, OFFSET, ROOM, SLOPE, draw_faces, list_faces, take_faces
+from .kernels.raster import CHUNK, GROUP, LENSES, MOST_FACES, OFFSET, ROOM, SLOPE, draw_faces, list_faces, read_faces
 
 # Largest deviation of an even camera's rays: of origins in lens pitches, of directions in lengths of a ray a lens.
 EVEN_PLACE, EVEN_WAY = 1e-7, 1e-11
@@ -176,6 +176,6 @@ class Raster:
                         (offsets[v], slopes[v]), room, wide, chosen, i * BLOCK * stride, lines, stride, buffer,
                     )  # fmt: skip
                 into = out[start + some[0] - top : start + some[1] - top, v]
-                take_faces(buffer, buffer.view(np.int32), wide, stride, columns, into)
+                read_faces(buffer, buffer.view(np.int32), wide, stride, columns, into)
             self._used(group, some[1] - some[0])
         return out.reshape(-1, wide * columns)[rows.start - top * down :][: rows.stop - rows.start]

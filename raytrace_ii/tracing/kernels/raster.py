@@ -138,11 +138,11 @@ def line_ranges(ax, a, bx, b, most, room):
         slope, offset = room[SLOPE + k], room[OFFSET + k]
         i, j = ax - a * slope - offset, bx - b * slope - offset
         wide = j - i
-        seen_ = abs(wide) > SLACK
+        broad = abs(wide) > SLACK
         last = np.floor(max(min(max(i, j) + SLACK, most), -1.0))
-        step = np.float64(np.float32(b - a) / np.float32(wide if seen_ else 1.0))
+        step = np.float64(np.float32(b - a) / np.float32(wide if broad else 1.0))
         room[FIRST + k] = np.ceil(max(min(i, j) - SLACK, 0.0))
-        room[LAST + k] = last if seen_ else -1.0
+        room[LAST + k] = last if broad else -1.0
         room[DISTANCE + k] = a - i * step
         room[STEP + k] = step
 
@@ -213,7 +213,7 @@ def draw_faces(corners, turn, entries, rows, top, view, room, lenses, chosen, li
 
 
 @lane_kernel
-def take_faces(buffer, bits, lenses, stride, columns, out):
+def read_faces(buffer, bits, lenses, stride, columns, out):
     """Move the faces of a buffer to pixels ``out`` of rows of views, and empty it."""
     lines = stride * ((columns + BLOCK - 1) // BLOCK * BLOCK)
     for row in range(out.shape[0]):

@@ -184,7 +184,7 @@ def test_any_rows_have_the_faces_of_the_picture():
 def test_the_kernels_do_what_their_source_says(monkeypatch):
     camera, corners = IICamera(pixels=(24, 12), lenses=(6, 3), pixel_pitch_mm=0.1, gap_mm=2.0), soup(25, 1.5, 13)
     compiled = rasterised(camera, corners)
-    for name in ("list_faces", "draw_faces", "take_faces"):
+    for name in ("list_faces", "draw_faces", "read_faces"):
         monkeypatch.setattr(raster, name, getattr(kernels, name).py_func)
     np.testing.assert_array_equal(rasterised(camera, corners), compiled)
     assert len(np.unique(compiled)) > 5
