@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -21,11 +23,12 @@ from ..tracing.kernels.arrays import Start
 from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
 from ..tracing.packing import packed, share
+from ..tracing.raster import Raster, Views, parallel_views
 from ..tracing.sampling import Adaptive, Edges, EvenRays, Sampling, Shoot, adaptive_mean, fixed_sum, number_of_samples
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer, start_tables
 from .audit import FULL_DEPTH, FULL_SAMPLES, Audit, chosen, compared
 from .nearness import parts_of_pixel, pixels_are_nearer, steps_at_content
-from .tiles import Order, Tile, ray_order, tiles
+from .tiles import Order, Tile, ray_order, strips, tiles
 
 TILE_RAYS = 65536  # many enough to hide the overhead of numpy, few enough for work arrays to stay in cache
 
@@ -70,8 +73,8 @@ class Block:
     arrays: dict[str, NDArray[Any]]
     count: RayCount
     samples: dict[int, int]
-    audit: Audit | None
-    cpu_seconds: float
+    audit: Audit | None = None
+    cpu_seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,9 @@ class Job:
     _local: threading.local = field(default_factory=threading.local, compare=False, repr=False)
     _stopped: threading.Event = field(default_factory=threading.Event, compare=False, repr=False)
     _channels: tuple[Job, ...] = field(default=(), init=False, compare=False, repr=False)
+    _views: Views | None = field(default=None, init=False, compare=False, repr=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock, init=False, compare=False, repr=False)
+    _rasters: list[Raster] = field(default_factory=list, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         cameras = self.camera.channel_cameras() if isinstance(self.camera, IICamera) else ()
@@ -104,6 +110,8 @@ class Job:
                 for camera, support in zip(cameras, supports, strict=True)
             ]
             object.__setattr__(self, "_channels", tuple(jobs))
+        elif self.sampling == 1 and (rays := self._separable_rays()) is not None:
+            object.__setattr__(self, "_views", parallel_views(rays, self.camera.lenses, self.pose))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (
@@ -112,9 +120,13 @@ class Job:
         )  # fmt: skip
 
     def tiles(self) -> list[Tile]:
-        """Return the tiles that cover the picture, in rows of tiles; independent of the workers."""
-        whole = not isinstance(self.sampling, int) or "coverage" in self.support
-        return list(tiles(self.camera, TILE_RAYS, whole_lenses=whole))
+        """Return the tiles that cover the picture, in rows of tiles; independent of the workers.
+
+        Those of parallel views are as wide as the picture: its faces are found row by row.
+        """
+        if self._views is not None:
+            return list(strips(self.camera, TILE_RAYS))
+        return list(self._parts_of())
 
     def stop(self) -> None:
         """Make all threads of this process leave their tiles after the current sample."""
@@ -126,18 +138,24 @@ class Job:
 
     def tile(self, rows: slice, cols: slice) -> Block:
         """Render one tile, and audit it."""
+        started, audit = time.thread_time(), None
         if self._channels:
             block = _merged([job.tile(rows, cols) for job in self._channels])
+        elif self._views is not None:
+            self._local.strip = rows.start, self._strip(rows)
+            block = _joined(rows, cols, [self._tile(*part) for part in self._parts_of((rows, cols))])
         else:
             block = self._tile(rows, cols)
-        if not self.audit:
-            return block
-        started = time.thread_time()
-        audit = self._audited(rows, cols, block.arrays["pixels"])
-        return replace(block, audit=audit, cpu_seconds=block.cpu_seconds + time.thread_time() - started)
+        if self.audit:
+            audit = self._audited(rows, cols, block.arrays["pixels"])
+        return replace(block, audit=audit, cpu_seconds=time.thread_time() - started)
+
+    def _parts_of(self, block: Tile | None = None) -> Iterator[Tile]:
+        """Return the parts of the picture, or of a block of it, that are traced at once."""
+        whole = not isinstance(self.sampling, int) or "coverage" in self.support
+        return tiles(self.camera, TILE_RAYS, block, whole_lenses=whole)
 
     def _tile(self, rows: slice, cols: slice) -> Block:
-        started = time.thread_time()
         tracer = self._tracer()
         shape = rows.stop - rows.start, cols.stop - cols.start
         order = ray_order(self.camera, rows, cols, self._by_lens())
@@ -164,7 +182,7 @@ class Job:
             image[order.pixels] = values
             image = image.reshape(*shape, *values.shape[1:])
             arrays[name] = disparity(self.camera, image) if name == "disparity" else image
-        return Block(rows, cols, arrays, tracer.count, histogram, None, time.thread_time() - started)
+        return Block(rows, cols, arrays, tracer.count, histogram)
 
     def _audited(self, rows: slice, cols: slice, pixels: NDArray[Any]) -> Audit:
         """Return the differences of the audited pixels of a tile from the same pixels in full."""
@@ -275,7 +293,10 @@ class Job:
         radiance = tracer.dark(len(order.pixels))
         start = self._start(rows, cols, order)
         if start is not None:
-            tracer.run_separable(start, radiance, support, self._keys(m, n, 0, 1))
+            top, faces = self._local.strip if samples == self.sampling and self._views is not None else (0, None)
+            if faces is not None:
+                faces = faces[rows.start - top : rows.stop - top, cols].reshape(-1)[order.pixels]
+            tracer.run_separable(start, radiance, support, self._keys(m, n, 0, 1), faces)
             return radiance
         for sample in range(samples):
             self._check_stopped()
@@ -292,15 +313,37 @@ class Job:
 
         Tables of the whole picture are computed once a thread: for every tile they would take 6 ns a pixel.
         """
+        tables = self._tables()
+        return None if tables is None else Start(*tables, order.rows, order.columns, rows.start, cols.start)
+
+    def _tables(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         if not hasattr(self._local, "tables"):
-            rays, some = None, slice(0, 2)
-            if isinstance(self.camera, IICamera) and self.camera.separable_rays(some, some) is not None:
-                rays = self.camera.separable_rays()  # of a camera without, it would compute all to no end
+            rays = self._separable_rays()
             self._local.tables = None if rays is None else start_tables(rays, self.pose)
-        if self._local.tables is None:
+        tables: tuple[NDArray[np.float64], NDArray[np.float64]] | None = self._local.tables
+        return tables
+
+    def _separable_rays(self) -> tuple[NDArray[np.float64], ...] | None:
+        """Return the rays of the picture by columns and rows; None if the camera's do not follow from them."""
+        some = slice(0, 2)
+        if not isinstance(self.camera, IICamera) or self.camera.separable_rays(some, some) is None:
+            return None  # of such a camera it would compute all to no end
+        return self.camera.separable_rays()
+
+    def _strip(self, rows: slice) -> NDArray[np.int32] | None:
+        """Return the nearest faces of rows of the picture, (rows, columns); None if Embree is to find them.
+
+        Faces are listed by rows once a process, for all threads.
+        """
+        tables = self._tables()
+        if self._views is None or tables is None or not self._tracer().takes_faces(tables[0], tables[1]):
             return None
-        by_columns, by_rows = self._local.tables
-        return Start(by_columns, by_rows, order.rows, order.columns, rows.start, cols.start)
+        with self._lock:
+            if not self._rasters:
+                scene = packed(self.scene).intersector
+                self._rasters.append(Raster(self._views, scene.corners, scene.first_of_same))
+            raster = self._rasters[0]
+        return raster.faces(rows) if raster.pays else None
 
     def _keys(self, m: NDArray[Any], n: NDArray[Any], first: int, count: int) -> NDArray[np.uint64] | None:
         """Return the keys of ``count`` samples of each pixel; None unless the scene is glossy."""
@@ -375,6 +418,27 @@ class Job:
         return shoot
 
 
+def _joined(rows: slice, cols: slice, blocks: list[Block]) -> Block:
+    """Return the tile of several parts, and the cost of all."""
+    if len(blocks) == 1:
+        return blocks[0]
+    arrays = {
+        name: np.empty((rows.stop - rows.start, cols.stop - cols.start, *part.shape[2:]), part.dtype)
+        for name, part in blocks[0].arrays.items()
+    }
+    count, samples = RayCount(), Counter[int]()
+    for block in blocks:
+        at = (
+            slice(block.rows.start - rows.start, block.rows.stop - rows.start),
+            slice(block.cols.start - cols.start, block.cols.stop - cols.start),
+        )
+        for name, part in block.arrays.items():
+            arrays[name][at] = part
+        count.add(block.count)
+        samples.update(block.samples)
+    return Block(rows, cols, arrays, count, dict(samples))
+
+
 def _merged(blocks: list[Block]) -> Block:
     """Return the tile of three channels: a channel of each, all other images of green, and the cost of all."""
     green = blocks[1]
@@ -382,8 +446,7 @@ def _merged(blocks: list[Block]) -> Block:
     count = RayCount()
     for block in blocks:
         count.add(block.count)
-    seconds = sum(block.cpu_seconds for block in blocks)
-    return replace(green, arrays={**green.arrays, "pixels": pixels}, count=count, cpu_seconds=seconds)
+    return replace(green, arrays={**green.arrays, "pixels": pixels}, count=count)
 
 
 def footprint(camera: Camera) -> tuple[float, float]:

@@ -35,19 +35,30 @@ class Order(NamedTuple):
     columns: NDArray[np.int32]
 
 
-def tiles(camera: Camera, rays: int, *, whole_lenses: bool = False) -> Iterator[Tile]:
+def tiles(camera: Camera, rays: int, block: Tile | None = None, *, whole_lenses: bool = False) -> Iterator[Tile]:
     """Return tiles of at most ``most`` rays, in rows of tiles; those of a regular camera hold whole packets.
 
-    ``whole_lenses`` keeps the pixels under one lens of a regular camera in one tile, even if they are more.
+    They cover the picture, or a block of it. ``whole_lenses`` keeps the pixels under one lens of a regular camera in
+    one tile, even if they are more.
     """
-    columns, rows = camera.pixels
+    down, right = block or (slice(0, camera.pixels[1]), slice(0, camera.pixels[0]))
+    columns, rows = right.stop - right.start, down.stop - down.start
     cells = _regular_cells(camera) or (1, 1)
     across = min(columns, max(1, math.isqrt(rays)))
     height = _span(min(rows, max(1, rays // across)), cells[1], whole_lenses)
     width = _span(min(columns, max(1, rays // height)), cells[0], whole_lenses)
+    for top in range(down.start, down.stop, height):
+        for left in range(right.start, right.stop, width):
+            yield slice(top, min(top + height, down.stop)), slice(left, min(left + width, right.stop))
+
+
+def strips(camera: Camera, rays: int) -> Iterator[Tile]:
+    """Return tiles as wide as the picture of a regular camera, of so many rays, or one row of packets at least."""
+    columns, rows = camera.pixels
+    unit = SIDE * (_regular_cells(camera) or (1, 1))[1]
+    height = max(rays // columns // unit, 1) * unit
     for top in range(0, rows, height):
-        for left in range(0, columns, width):
-            yield slice(top, min(top + height, rows)), slice(left, min(left + width, columns))
+        yield slice(top, min(top + height, rows)), slice(0, columns)
 
 
 def _span(most: int, cell: int, whole: bool) -> int:

@@ -246,6 +246,7 @@ class Tracer:
         self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
         self._pixels = np.arange(capacity, dtype=np.int32)  # of rays one a pixel: read only
         self._radiance = np.empty((capacity, 3), np.float32)
+        self._unplaced = np.zeros((3, capacity), np.float32)  # u, v and distance, which shading finds: read only
         self._shadow = _shadow_room(0, self.scene.nested)
         self._work = work()
         self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
@@ -332,33 +333,42 @@ class Tracer:
 
     def run_separable(
         self, start: Start, radiance: NDArray[np.float32], support: Support | None,
-        keys: NDArray[np.uint64] | None = None,
+        keys: NDArray[np.uint64] | None = None, faces: NDArray[np.int32] | None = None,
     ) -> None:  # fmt: skip
-        """`run` for rays by columns and rows of pixels."""
+        """`run` for rays by columns and rows of pixels.
+
+        ``faces`` are the nearest ones, −1 where there is none, of rays that `takes_faces` is true of.
+        """
         room, n = self._primary._replace(pixels=self._pixels), len(start.rows)
         room.inside.fill(-1)
         if keys is not None:
             room.keys[:n] = keys
-        if self._near_glass(start) or not self._finds:  # they are wanted before the kernel runs
+        if not self.takes_faces(start.column_rays, start.row_rays):  # they are wanted before the kernel runs
             start_separable_rays(start, self._work, room.origins, room.directions)
             room.weights.fill(1)
             start = _NO_START
-        self._trace(room, n, radiance, support, start)
+        hits = _NO_HITS if faces is None else Hits(faces, *self._unplaced[:, :n])
+        self._trace(room, n, radiance, support, start, hits)
 
-    def _near_glass(self, start: Start) -> bool:
+    def takes_faces(self, column_rays: NDArray[np.float64], row_rays: NDArray[np.float64]) -> bool:
+        """Return whether the kernel makes the camera rays of these tables, and needs no more of hits than faces."""
+        return self._finds and not self._near_glass(column_rays, row_rays)
+
+    def _near_glass(self, column_rays: NDArray[np.float64], row_rays: NDArray[np.float64]) -> bool:
         """Return whether any camera ray of the picture may start within the bounds of a clear body."""
-        if self._told[0] is not start.column_rays:
-            columns, rows = (rays.reshape(-1, 8)[:, :3] for rays in (start.column_rays, start.row_rays))
+        if self._told[0] is not column_rays:
+            columns, rows = (rays.reshape(-1, 8)[:, :3] for rays in (column_rays, row_rays))
             low, high = columns.min(axis=0) + rows.min(axis=0), columns.max(axis=0) + rows.max(axis=0)
             around, slack = self.scene.clear_bounds, 1e-6 * (np.abs(low) + np.abs(high))  # rays start at float32's
             near = ((low - slack <= around[:, 1]) & (high + slack >= around[:, 0])).all(axis=1).any()
-            self._told = start.column_rays, bool(near)
+            self._told = column_rays, bool(near)
         return self._told[1]
 
     def _trace(
-        self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None, start: Start
-    ) -> None:
-        """Trace the first n of the primary rays."""
+        self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None, start: Start,
+        hits: Hits = _NO_HITS,
+    ) -> None:  # fmt: skip
+        """Trace the first n of the primary rays, whose hits may be known."""
         rays = _rows(primary, slice(n))
         self.count.rays["primary"] += n
         if self.scene.transmits and not len(start.rows):
@@ -366,18 +376,18 @@ class Tracer:
         for depth in range(self.max_depth + 1):
             lobe_rays = self.lobes[0] if depth == 0 else 1
             spawn = depth < self.max_depth
-            rays = self._generation(start, rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
-            start = _NO_START
+            rays = self._generation(start, hits, rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
+            start, hits = _NO_START, _NO_HITS
             if not len(rays.pixels):
                 break
 
     def _generation(
-        self, start: Start, rays: Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool,
-        lobe_rays: int,
+        self, start: Start, hits: Hits, rays: Rays, radiance: NDArray[np.float32], support: Support | None,
+        spawn: bool, lobe_rays: int,
     ) -> Rays:  # fmt: skip
         """Trace and shade one generation; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
-        hits = _NO_HITS if self._finds else self._hits(rays)
+        hits = hits if self._finds else self._hits(rays)
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
         through, mirrored = n * (s.transmits + 2 * s.disperses + s.blends), n * (lobe_rays if s.glossy else 1)
         following = _room(through + mirrored if spawn else 0, s.nested, s.glossy, any(self.footprint))

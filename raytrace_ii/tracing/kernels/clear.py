@@ -10,9 +10,8 @@ import numpy as np
 from ii_core.base.jit import lean_kernel as kernel
 from ii_core.base.jit import stage_kernel
 
-from .fresnel import fresnel
 from .light import move
-from .media import cross, enter, leave, media_at, medium_of, refractive_index, transmits
+from .media import cross, enter, fresnel, leave, media_at, medium_of, refractive_index, transmits
 from .tables import ABSORPTION, ALPHA_BLEND, FAR, LEAST_WEIGHT, TRANSMISSION
 from .textures import is_cut_out, share_there
 from .vectors import put, put_behind

@@ -14,15 +14,14 @@ from raytrace_ii.rendering.job import Job
 from raytrace_ii.scene.textures import Image
 from raytrace_ii.tracing import tracer
 from raytrace_ii.tracing.embree import lane_masks
-from raytrace_ii.tracing.intersect import Intersector
+from raytrace_ii.tracing.intersect import Intersector, first_of_same
 from raytrace_ii.tracing.kernels import appearance, attributes, sky, spawn, way
 from raytrace_ii.tracing.kernels.arrays import ShadowRays, Start
-from raytrace_ii.tracing.kernels.fresnel import fresnel
 from raytrace_ii.tracing.kernels.lanes import work
 from raytrace_ii.tracing.kernels.light import keep_unblocked
+from raytrace_ii.tracing.kernels.media import fresnel
 from raytrace_ii.tracing.kernels.packets import NO_CALLS, Tools
 from raytrace_ii.tracing.kernels.start import start_rays, start_separable_rays
-from raytrace_ii.tracing.same_faces import first_of_same
 from tests.support.pictures import scene
 from tests.support.slow import first_fast
 from tests.support.trace_scenes import WHITE, body, hall, sphere, wall

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from raytrace_ii import Background, Material, Scene, trace
 from raytrace_ii.scene.textures import Checker
 from raytrace_ii.shapes.primitives import Mesh
-from raytrace_ii.tracing.kernels.fresnel import fresnel
+from raytrace_ii.tracing.kernels.media import fresnel
 from raytrace_ii.tracing.kernels.srgb import encode_srgb
 from raytrace_ii.tracing.kernels.tables import LEAST_WEIGHT
 from raytrace_ii.tracing.lift import LIFT
