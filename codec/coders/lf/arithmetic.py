@@ -199,47 +199,49 @@ def _mixed_probability(odds):
     return np.int64(SQUASHED[min(max(odds >> 16, -FARTHEST), FARTHEST) + FARTHEST])
 
 
+@stage_kernel
+def _weighed(contexts, weights, odds):
+    """Sum of three log odds by the weights of a row, in units of 2^-24."""
+    total = np.int64(contexts[weights, 0]) * odds[0] + np.int64(contexts[weights, 1]) * odds[1]
+    return total + np.int64(contexts[weights, 2]) * odds[2]
+
+
+@stage_kernel
+def _learn_three(contexts, weights, of, odds, missed, bit):
+    """Move the weights of a row by what their sum missed, and three contexts by the bit."""
+    contexts[weights, 0] += (odds[0] * missed) >> 20
+    contexts[weights, 1] += (odds[1] * missed) >> 20
+    contexts[weights, 2] += (odds[2] * missed) >> 20
+    _learn(contexts, of[0], bit)
+    _learn(contexts, of[1], bit)
+    _learn(contexts, of[2], bit)
+
+
 @tuned_kernel
 def _code_refined(coder, context, bit):
     """As `code_bit`, mixed with the bits of the same element before."""
     contexts, element = coder.contexts, np.int64(ELEMENT_OF[context])
     weights = ELEMENT_WEIGHTS + 2 * element
     before = np.int64(contexts[weights + 1, 0])
-    long, short = HISTORY + 16 * element + before, RECENT + 4 * np.int64(PLACE_OF[context]) + (before & 3)
-    a, b, c = _odds(contexts, context), _odds(contexts, long), _odds(contexts, short)
-    odds = (
-        np.int64(contexts[weights, 0]) * a + np.int64(contexts[weights, 1]) * b + np.int64(contexts[weights, 2]) * c
-    )
-    p = _mixed_probability(odds)
+    of = context, HISTORY + 16 * element + before, RECENT + 4 * np.int64(PLACE_OF[context]) + (before & 3)
+    odds = _odds(contexts, of[0]), _odds(contexts, of[1]), _odds(contexts, of[2])
+    p = _mixed_probability(_weighed(contexts, weights, odds))
     bit = _code_with(coder, p, bit)
-    missed = ((ONE if bit else 0) - p) * REFINED_RATE
-    contexts[weights, 0] += (a * missed) >> 20
-    contexts[weights, 1] += (b * missed) >> 20
-    contexts[weights, 2] += (c * missed) >> 20
+    _learn_three(contexts, weights, of, odds, ((ONE if bit else 0) - p) * REFINED_RATE, bit)
     contexts[weights + 1, 0] = (2 * before + bit) & 15
-    _learn(contexts, context, bit)
-    _learn(contexts, long, bit)
-    _learn(contexts, short, bit)
     return bit
 
 
 @tuned_kernel
 def code_of_four(coder, one, other, third, fourth, weights, bit):
     """As `code_mixed`, of four contexts; the fourth weight stands in the row after the others."""
-    contexts = coder.contexts
-    a, b, c, d = _odds(contexts, one), _odds(contexts, other), _odds(contexts, third), _odds(contexts, fourth)
-    odds = np.int64(contexts[weights, 0]) * a + np.int64(contexts[weights, 1]) * b
-    odds += np.int64(contexts[weights, 2]) * c + np.int64(contexts[weights + 1, 0]) * d
-    p = _mixed_probability(odds)
+    contexts, of = coder.contexts, (one, other, third)
+    odds, last = (_odds(contexts, one), _odds(contexts, other), _odds(contexts, third)), _odds(contexts, fourth)
+    p = _mixed_probability(_weighed(contexts, weights, odds) + np.int64(contexts[weights + 1, 0]) * last)
     bit = _code_with(coder, p, bit)
     missed = ((ONE if bit else 0) - p) * REFINED_RATE
-    contexts[weights, 0] += (a * missed) >> 20
-    contexts[weights, 1] += (b * missed) >> 20
-    contexts[weights, 2] += (c * missed) >> 20
-    contexts[weights + 1, 0] += (d * missed) >> 20
-    _learn(contexts, one, bit)
-    _learn(contexts, other, bit)
-    _learn(contexts, third, bit)
+    _learn_three(contexts, weights, of, odds, missed, bit)
+    contexts[weights + 1, 0] += (last * missed) >> 20
     _learn(contexts, fourth, bit)
     return bit
 
