@@ -181,6 +181,18 @@ def test_any_rows_have_the_faces_of_the_picture():
         np.testing.assert_array_equal(some.faces(rows), whole[rows])
 
 
+def test_lists_are_made_once_and_let_go_after_the_last_row(monkeypatch):
+    """Two groups of rows of lenses, by tiles of five: one call counts, one lists; then nothing is held."""
+    camera, calls = CAMERAS["more rows of lenses than a group"], []
+    views = parallel_views(camera.separable_rays(), camera.lenses, np.eye(4))
+    monkeypatch.setattr(raster, "list_faces", lambda *of: (calls.append(1), kernels.list_faces(*of)))
+    picture = Raster(views, soup(200, 1.0, 2), NONE)
+    for row in range(0, camera.pixels[1], 10):
+        picture.faces(slice(row, min(row + 10, camera.pixels[1])))
+    assert len(calls) == 2
+    assert not picture._lists
+
+
 def test_the_kernels_do_what_their_source_says(monkeypatch):
     camera, corners = IICamera(pixels=(24, 12), lenses=(6, 3), pixel_pitch_mm=0.1, gap_mm=2.0), soup(25, 1.5, 13)
     compiled = rasterised(camera, corners)
