@@ -19,7 +19,6 @@ from . import depth, focus, measure_depth, observers, retarget, video
 from .common import app
 from .ending import ends_soon
 from .folders import no_empty_folders
-from .renamed import present
 from .words import SPELT, one_line
 
 __all__ = [
@@ -59,7 +58,7 @@ def main() -> None:
 def _run() -> None:
     try:
         with no_empty_folders():
-            code = app(args=present(sys.argv[1:]), standalone_mode=False)
+            code = app(args=sys.argv[1:], standalone_mode=False)
         if code == INTERRUPTED:  # typer's return value after Ctrl-C
             print("interrupted", file=sys.stderr)
         sys.exit(code if isinstance(code, int) else 0)

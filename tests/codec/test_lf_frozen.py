@@ -26,11 +26,11 @@ import pytest
 
 from codec import Encoded, decode
 from codec.coders.lf import stream
-from codec.coders.lf.blocks import CODED, DIRECTION, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS, TALL, WIDE
 from codec.coders.lf.field import Field
 from codec.coders.lf.pyramid import ALIKE, NEAREST, _spread, pyramid
+from codec.coders.lf.state import CODED, DIRECTION, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS, TALL, WIDE
 from ii_core.base.jit import lean_kernel, part_kernel
-from tests.support.golden import unpacked
+from tests.support.pictures import unpacked
 
 FOLDER = unpacked("lf.zip")
 PIXELS = {

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from codec.coders.lf import arithmetic, contexts
-from codec.coders.lf.blocks import UNKNOWN, Job, new_blocks
 from codec.coders.lf.matching import CELLS, fill_products, new_match
+from codec.coders.lf.state import UNKNOWN, Job, new_blocks
 from codec.coders.lf.stream import UPRIGHT
 from tests.support.slow import first_fast
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from codec import decode, encode
 from codec.coders.lf import arithmetic, coefficients, contexts, samples, stream
 from codec.coders.lf import coder as lf
-from codec.coders.lf.blocks import CODED, SKIPPED, TALL, WIDE
 from codec.coders.lf.field import Field
+from codec.coders.lf.state import CODED, SKIPPED, TALL, WIDE
 from codec.contract import checked_options
 from ii_core import IIPicture
 from metrics import q_global

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from codec import EncodedTake, Plan, encode, encode_take, light_field_cost, open_take, take_floor
 from codec.coders.lf import motion, segment
-from codec.coders.lf.blocks import MIXED, TIMED
 from codec.coders.lf.field import Field
+from codec.coders.lf.state import MIXED, TIMED
 from codec.contract import checked_options, find
 from ii_core import IIPicture, sub_images, video_of
-from tests.support.golden import unpacked
+from tests.support.pictures import unpacked
 from tests.support.slow import first_fast
 
 FROZEN = unpacked("lf.zip")

@@ -17,7 +17,6 @@ from codec.coders.lf import (
     rig,
     rig_search,
     stream,
-    tuning,
 )
 from codec.coders.lf import coder as lf
 from codec.contract import checked_options
@@ -48,7 +47,7 @@ def test_the_measure_is_that_of_the_test_conditions(dtype):
     noise = np.rint(rng.normal(0, top / 60, original.pixels.shape))
     decoded = original.with_pixels(np.clip(original.pixels + noise, 0, top).astype(dtype))
     pairs = zip(sub_images(original).reshape(-1, 8, 12, 3), sub_images(decoded).reshape(-1, 8, 12, 3), strict=True)
-    ours = [tuning.psnr_yuv(a, b) for a, b in pairs]
+    ours = [planes.psnr_yuv(a, b) for a, b in pairs]
     np.testing.assert_allclose(ours, q_ctc_psnr(original, decoded).values.ravel(), rtol=1e-9)
 
 
@@ -57,9 +56,9 @@ def test_planes_are_scaled_so_that_errors_count_as_the_measure_counts_them():
     scales = 40, 40  # squares of errors in planes: 3 of Y, 3 · (40/64)² of Cb and Cr
     errors = np.array([3 * 2e6, 3 * (40 / 64) ** 2 * 1e6, 3 * (40 / 64) ** 2 * 2e6])
     for views, more in [(1, 1), (25, 1), (45, 1.3**0.5), (81, 1.3), (256, 1.3)]:
-        found = np.array(tuning.better_scales(scales, errors, views))
+        found = np.array(planes.better_scales(scales, errors, views))
         np.testing.assert_allclose((found / 64) ** 2, np.multiply([2 / 6 / 1, 2 / 6 / 2], more**2), rtol=0.05)
-    assert tuning.better_scales(scales, np.array([1e6, 0, 1e12]), 25) == (tuning.MOST, tuning.LEAST)
+    assert planes.better_scales(scales, np.array([1e6, 0, 1e12]), 25) == (planes.MOST_SCALE, planes.LEAST_SCALE)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])

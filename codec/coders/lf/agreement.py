@@ -12,7 +12,8 @@ import numpy as np
 
 from ii_core.base.jit import part_kernel, stage_kernel
 
-from .blocks import DIFFERENT, UNKNOWN
+from .kinds import DIFFERENT
+from .state import UNKNOWN
 from .warp import LATTICE, clamped, led
 
 MATCHED = 4  # sources that take part in matching

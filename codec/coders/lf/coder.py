@@ -28,13 +28,13 @@ from . import (
     search,
     stream,
     synthesis,
-    tuning,
 )
-from .blocks import MOST_REFERENCES, Job, Work, code_blend, code_view, new_work, zeros
+from .blocks import code_blend, code_view
 from .contexts import Contexts
 from .field import Field
 from .pyramid import Node, Place, pyramid
 from .search import Search
+from .state import MOST_REFERENCES, Job, Work, new_work, zeros
 from .stream import Header
 
 FINEST, COARSEST = 0, 63
@@ -257,7 +257,7 @@ class Source:
         self.height, self.width, self.grid = shape(picture)
         self.effort, self.threads = int(options["effort"]), int(options["threads"])
         exact = bool(options["lossless"])
-        scales = None if exact or options["tune"] == "rgb" or _grey(self.pixels) else (tuning.START, tuning.START)
+        scales = None if exact or options["tune"] == "rgb" or _grey(self.pixels) else planes.FIRST_SCALES
         if scales:
             self.axes, colours = planes.bt709_axes(scales), planes.bt709_colours(scales)
         else:
@@ -307,7 +307,7 @@ class Source:
             row, col = divmod(number, cols)
             original, decoded = self.pixels[row::rows, col::cols], field.view_pixels(number)
             if self.header.scales:
-                views.append(tuning.psnr_yuv(original, decoded))
+                views.append(planes.psnr_yuv(original, decoded))
             else:
                 error += float(np.square(decoded.astype(np.float32) - original).sum(dtype=np.float64))
         if views:
@@ -332,7 +332,7 @@ class Source:
         header = replace(self.header, steps=self.steps(setting))
         if header.scales is None:
             return header
-        scales = tuning.START, tuning.START
+        scales = planes.FIRST_SCALES
         header = self._scaled(header, scales)
         trial = self.field(header)
         # All with the step of most views, by which errors are those of most views.
@@ -346,7 +346,7 @@ class Source:
         for place in np.argwhere(trial.decoded).tolist():
             decoded = trial.views[trial.number((place[0], place[1]))]
             errors += np.square(decoded.astype(np.float32) - self.view(*place)).sum(axis=(1, 2), dtype=np.float64)
-        return self._scaled(header, tuning.better_scales(scales, errors, len(trial.views)))
+        return self._scaled(header, planes.better_scales(scales, errors, len(trial.views)))
 
     def _scaled(self, header: Header, scales: tuple[int, int]) -> Header:
         """Return the header with other scales of planes; the source's planes get them, too."""

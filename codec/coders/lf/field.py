@@ -11,21 +11,11 @@ from numpy.typing import NDArray
 
 from . import loop_filter, motion, rig, synthesis
 from .arithmetic import Arithmetic
-from .blocks import (
-    DONE,
-    MOST_HALVINGS,
-    MOST_INDEX,
-    MOST_REFERENCES,
-    UNKNOWN,
-    Job,
-    Work,
-    code_view,
-    new_blocks,
-    zeros,
-)
+from .blocks import MOST_HALVINGS, MOST_INDEX, code_view
 from .exact import code_exact, new_exact, prepare
 from .planes import gather, scatter
 from .pyramid import Node, Place, batches, pyramid
+from .state import DONE, MOST_REFERENCES, UNKNOWN, Job, Work, new_blocks, zeros
 from .stream import UPRIGHT, Header
 from .synthesis import Synthesis, chosen, new_synthesis
 from .warp import LATTICE, UNSHIFTED

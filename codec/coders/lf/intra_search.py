@@ -6,9 +6,10 @@ import numpy as np
 
 from ii_core.base.jit import part_kernel, stage_kernel
 
-from .blocks import DONE, INTRA, kind_cost
 from .intra import DIRECTIONS, FROM_LEFT, MODES, fill_border, predict_along, predict_intra
+from .kinds import kind_cost
 from .matching import HUGE
+from .state import DONE, INTRA
 from .transform import sides
 
 FIRST_DIRECTION = MODES - DIRECTIONS

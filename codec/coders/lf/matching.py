@@ -12,7 +12,8 @@ import numpy as np
 
 from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel
 
-from .blocks import EXPLICIT, MOST_REFERENCES, UNKNOWN, from_where, guesses, kind_cost, mask_cost, seen_mask
+from .kinds import from_where, guesses, kind_cost, mask_cost, seen_mask
+from .state import EXPLICIT, MOST_REFERENCES, UNKNOWN
 from .transform import LARGEST, sides
 from .warp import clamped, led, moved_block
 

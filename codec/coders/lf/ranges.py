@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .blocks import Job
 from .matching import DIAGONAL, fill_products, new_match
 from .rig import Rig, departing
+from .state import Job
 from .stream import UPRIGHT
 from .transform import LARGEST
 
@@ -171,7 +171,7 @@ def offsets(
     grid: tuple[int, int],
     rig: Rig | None = None,
 ) -> NDArray[np.int64]:
-    """Return number, columns and rows (J, 3) of how far other views are on the lattice, as `blocks.Job` has them."""
+    """Return number, columns and rows (J, 3) of how far other views are on the lattice, as `state.Job` has them."""
     (row, col), (across, down, apart) = place, lattice
     rows = [
         (i, UPRIGHT * (c - col) + across * (r - row), down * (c - col) + apart * (r - row))

@@ -10,11 +10,12 @@ from ii_core.base.jit import part_kernel, stage_kernel
 
 from . import motion
 from .arithmetic import bit_cost
-from .blocks import FIELDS, INTRA, LIMIT, coded_context, residual_context, skipped_context, transform_cost
+from .blocks import LIMIT, coded_context, residual_context, skipped_context, transform_cost
 from .coefficients import Trellis, new_trellis, quantise, quantise_dependent
 from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
 from .intra import MODES
 from .samples import LARGEST_SKIPPED, quantise_samples
+from .state import FIELDS, INTRA
 from .transform import LARGEST, forward, sides, size_of
 
 BEST = 2

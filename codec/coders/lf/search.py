@@ -11,24 +11,10 @@ from ii_core.base.jit import array_kernel, part_kernel, stage_kernel
 
 from .arithmetic import bit_cost
 from .blocks import (
-    CROSS_1,
-    CROSS_2,
-    DONE,
-    EXPLICIT,
-    INTRA,
-    LOG,
     LOG_LARGEST,
     LOG_LEAST,
-    MIXED,
-    PARTS,
-    SYNTHESIS,
-    TIMED,
-    Job,
-    guesses,
     halved,
-    kind_cost,
     mark_block,
-    new_work,
     note_skipped,
     part_ways,
     predict_direction,
@@ -40,9 +26,11 @@ from .blocks import (
 from .field import EIGHTH
 from .intra import MODES
 from .intra_search import least_error, rank_directions
+from .kinds import guesses, kind_cost
 from .matching import HUGE, best_explicit, fill_products, new_match
 from .motion import best_vector, predict_in_time
 from .residual_search import BEST, copy_trial, estimated_cost, keep, new_trial, try_residual, try_transform
+from .state import CROSS_1, CROSS_2, DONE, EXPLICIT, INTRA, LOG, MIXED, PARTS, SYNTHESIS, TIMED, Job, new_work
 from .transform import sides
 
 # A block is not divided if so many times its cost are more than another way to code the region may cost. Of the part

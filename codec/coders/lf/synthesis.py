@@ -16,7 +16,7 @@ import numpy as np
 from ii_core.base.jit import array_kernel, lean_kernel, part_kernel, stage_kernel
 
 from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, disagreement, hashed
-from .blocks import EXPLICIT, INDEX, KIND, UNKNOWN, zeros
+from .state import EXPLICIT, INDEX, KIND, UNKNOWN, zeros
 from .transform import LARGEST
 from .warp import BEFORE, FILTERS, LATTICE, TAPS, UNSHIFTED, clamped, filtered, led
 
