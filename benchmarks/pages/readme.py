@@ -18,7 +18,6 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, origin
 from benchmarks.speed import mitsuba, ratios
 from benchmarks.speed.before import COMMIT, MENDED
-from benchmarks.speed.pareto import BAND
 from ii_core import preset
 from raytrace_ii import scene_names
 
@@ -60,10 +59,11 @@ def peers_table() -> list[str]:
     """Return `render` and `si-lf` against programs of others, a line for each claim."""
     speed, pictures, coded = mitsuba.RECORDS.rows(scale=1), povray.RECORDS.rows(scale=povray.SCALE), meetings()
     version = " and ".join(dict.fromkeys(row["mitsuba"] for row in speed))
-    time = factors([1 / row["ratio"] for row in speed])
+    times = [factors([1 / row[name] for row in speed]) for name in ("ratio", "robust_ratio")]
     psnr = [part["POV-Ray / ours, dB"] for row in pictures for part in row["rows"] if part["seen"] == "all"]
     claims = [
-        ("`render`: CPU time", f"Mitsuba {version}", f"512×{BAND}", time, NONE),
+        ("`render`: CPU time", f"Mitsuba {version}", "512×256", times[0], NONE),
+        ("`render`: CPU time", "robust Mitsuba", "512×256", times[1], NONE),
         ("`render`: PSNR", "POV-Ray", NONE, span([f"{value:.0f} dB" for value in sorted(psnr)]), NONE),
     ]
     lines, compared = anchor_claims()
@@ -170,7 +170,7 @@ def percents(values: Sequence[float | None]) -> str:
 
 def factors(values: Sequence[float]) -> str:
     """Return factors with two digits at least."""
-    return span([f"{value:.0f} ×" if value >= 10 else f"{value:.2g} ×" for value in sorted(values)])
+    return span([f"{value:.{0 if value >= 10 else 1 if value >= 0.995 else 2}f} ×" for value in sorted(values)])
 
 
 def span(texts: Sequence[str]) -> str:
