@@ -15,14 +15,15 @@ import numpy as np
 
 from ii_core.base.jit import array_kernel, lean_kernel, part_kernel, stage_kernel
 
-from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, disagreement, hashed
+from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, disagreement, hashed
+from .kinds import DIFFERENT
 from .state import EXPLICIT, INDEX, KIND, UNKNOWN, zeros
 from .transform import LARGEST
-from .warp import BEFORE, FILTERS, LATTICE, TAPS, UNSHIFTED, clamped, filtered, led
+from .warp import BEFORE, FILTERS, LATTICE, TAPS, clamped, filtered, led
 
 CANDIDATES = 8
 MOST_SOURCES = 8
-RUN = 32  # samples of a row that are blended together, if their disparity is the same
+RUN = LARGEST  # samples of a row that are blended together: all within a square, for squares have shifts
 MET = 64  # disparities around a sample that are known to have been looked at
 SMOOTH = 8  # cost of a step of disparity
 
@@ -60,9 +61,17 @@ class Synthesis(NamedTuple):
         How far the sources differ, by row, position and disparity.
     marks : ndarray of int64, (ROWS · W / SPAN · SLOTS,)
         Row and disparity of what is kept.
-    taken : ndarray of int32, (MOST_SOURCES, 3, RUN)
-        Samples of the sources for a run of samples of one disparity.
-    sums : ndarray of int32, (RUN + TAPS - 1,)
+    taken : ndarray of int32, (MOST_SOURCES + 1, 3, RUN + 4)
+        Samples of the sources for those that are blended together, the last of the source most like the others,
+    weights, totals : ndarray of int32, (MOST_SOURCES, RUN)
+        their weights, and how far each is from the others,
+    found : ndarray of int32, (4, RUN)
+        which is most like the others, its distances, and sums of weights,
+    blended : ndarray of float64, (3, RUN)
+        and sums of samples.
+    near : ndarray of int64, (MOST_SOURCES,)
+        Squared distance from the nearest sample of each source, in units of 1/64.
+    sums : ndarray of int32, (RUN + TAPS + 3,)
     met : ndarray of int64, (MET,)
         Samples and disparities that were looked at.
     """
@@ -81,6 +90,11 @@ class Synthesis(NamedTuple):
     kept: Any
     marks: Any
     taken: Any
+    weights: Any
+    totals: Any
+    found: Any
+    blended: Any
+    near: Any
     sums: Any
     met: Any
 
@@ -102,8 +116,13 @@ def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
         span=np.zeros((MATCHED, SPAN), np.int32),
         kept=np.zeros((ROWS * -(-width // SPAN) * SLOTS, SPAN), np.int16),
         marks=np.full(ROWS * -(-width // SPAN) * SLOTS, -1),
-        taken=np.zeros((MOST_SOURCES, 3, RUN), np.int32),
-        sums=np.zeros(RUN + TAPS - 1, np.int32),
+        taken=np.zeros((MOST_SOURCES + 1, 3, RUN + 4), np.int32),
+        weights=np.zeros((MOST_SOURCES, RUN), np.int32),
+        totals=np.zeros((MOST_SOURCES, RUN), np.int32),
+        found=np.zeros((4, RUN), np.int32),
+        blended=np.zeros((3, RUN)),
+        near=np.zeros(MOST_SOURCES, np.int64),
+        sums=np.zeros(RUN + TAPS + 3, np.int32),
         met=np.full(MET, -1),
     )
 
@@ -167,16 +186,30 @@ def choose(s, apart):
                         if new and number < tried.size:
                             tried[np.uint64(number)] = d
                             number += 1
-            best, least = np.int64(UNKNOWN), np.int64(1 << 40)
-            if number == 1:
-                best = tried[0]
-            else:
-                for k in range(number):
-                    cost = disagreement(s, y, x, tried[k], least)
-                    if cost < least:
-                        least, best = cost, tried[k]
+            left = np.int64(s.disparity[y, x - 1]) if x > 0 else np.int64(UNKNOWN)
+            best = _best_tried(s, y, x, number, left) if number > 1 else (tried[0] if number else np.int64(UNKNOWN))
             s.disparity[y, x] = best
     _fill(s.disparity)
+
+
+@stage_kernel
+def _best_tried(s, y, x, number, left):
+    """Of the first disparities tried, the one on which the sources agree best, and the first of equals.
+
+    That of the sample to the left is looked at first: it is often best, and of others less is then computed.
+    """
+    tried, best = s.tried, np.int64(0)
+    for k in range(number):
+        if tried[k] == left:
+            best = k
+    start, least = best, disagreement(s, y, x, tried[np.uint64(best)], np.int64(1 << 40))
+    for k in range(number):
+        if k != start:
+            earlier = 1 if k < best else 0
+            cost = disagreement(s, y, x, tried[k], least + earlier)
+            if cost < least + earlier:
+                least, best = cost, k
+    return tried[np.uint64(best)]
 
 
 @part_kernel
@@ -207,32 +240,22 @@ def blend(s, nearest, every):
     height, width = s.counts.shape
     count = s.sources.shape[0]
     _weigh_sources(s, nearest)
-    # A run is within a square, if squares have shifts.
-    squares = 1 if s.sources.shape[1] > UNSHIFTED else 0
     for y in range(height >> 2):
         for x in range(width >> 2):
             s.doubt[y, x] = 0
     for y in range(0, height, every):
-        x = start = end = 0
-        while x < width:
-            d = np.int64(s.disparity[y, x])
-            if x == end and not nearest:
+        for first in range(0, width, RUN):
+            x, last = first, min(first + RUN, width)
+            while x < last:
                 end = x + 1
-                while end < width and end - x < RUN and s.disparity[y, end] == s.disparity[y, x]:
-                    if squares and end % LARGEST == 0:
-                        break
+                while end < last and s.disparity[y, end] == s.disparity[y, x]:
                     end += 1
-                start = x
-                _interpolate(s, y, x, end - x, np.int64(0) if d == UNKNOWN else d, count)
-            if d == UNKNOWN:
-                d = np.int64(0)
-            most = np.int64(-1)
-            for r in range(count):
-                most = max(most, _take(s, r, y, x, d, nearest, x - start))
-            if nearest:
-                _prefer_nearest(s, count, most)
-            s.doubt[y >> 2, x >> 2] += (_weighted(s, y, x, count) + 8) >> 4
-            x += 1
+                d = np.int64(s.disparity[y, x])
+                _take_run(s, y, x, end - x, np.int64(0) if d == UNKNOWN else d, nearest, x - first)
+                x = end
+            _most_alike(s, count, last - first)
+            _add_weighted(s, count, last - first)
+            _store_run(s, y, first, last - first)
 
 
 @stage_kernel
@@ -245,40 +268,51 @@ def _weigh_sources(s, nearest):
             s.scratch[6 + kind, r] = weight if nearest else weight * 64 // far
 
 
-@stage_kernel
-def _take(s, r, y, x, d, nearest, place):
-    """s.scratch[1:6, r] = sample, weight and distance of a source along a disparity; return the weight.
-
-    ``place`` is that of the sample in the run that `_interpolate` has made.
-    """
+@part_kernel
+def _take_run(s, y, x, length, d, nearest, place):
+    """Fill taken and weights of all sources, from ``place`` on, for samples that follow each other in a disparity."""
     height, width = s.counts.shape
-    dy, dx = led(s.sources, r, d, y, x, (height, width))
-    at_x, at_y = 256 * x + dx, 256 * y + dy
-    inside = -128 <= at_x <= 256 * width - 128 and -128 <= at_y <= 256 * height - 128
-    weight = s.scratch[(6 if agrees(s, r, y, x, d) else 7) if inside else 8, r]
+    count, most = s.sources.shape[0], np.int64(-1)
+    for r in range(count):
+        view = s.sources[r, 0]
+        dy, dx = led(s.sources, r, d, y, x, s.counts.shape)
+        far = max(abs(s.sources[r, 1]), abs(s.sources[r, 2]))
+        agreeing, other, unseen = s.scratch[6, r], s.scratch[7, r], s.scratch[8, r]
+        weights, j = s.weights[r], y + ((dy + 128) >> 8)
+        inside = -128 <= 256 * y + dy <= 256 * height - 128
+        for k in range(length):
+            at, i = 256 * (x + k) + dx, x + k + ((dx + 128) >> 8)
+            weight = unseen
+            if inside and -128 <= at <= 256 * width - 128:
+                weight = other
+                if 0 <= i < width and 0 <= j < height:
+                    known = np.int64(s.disparities[np.uint64(view), np.uint64(j), np.uint64(i)])
+                    if known != UNKNOWN and abs(known - d) * far < DIFFERENT << LATTICE:
+                        weight = agreeing
+            weights[np.uint64(place + k)] = weight
+        if nearest:
+            i = x + ((dx + 128) >> 8)
+            fx, fy = ((dx + 128) & 255) - 128, ((dy + 128) & 255) - 128
+            s.near[r] = min((fx * fx + fy * fy) >> 10, 64)
+            for p in range(3):
+                row = s.views[view, p, clamped(j, height)]
+                for k in range(length):
+                    s.taken[r, p, np.uint64(place + k)] = row[np.uint64(clamped(i + k, width))]
+        else:
+            ix, iy, px, py = x + (dx >> 8), y + (dy >> 8), (dx >> 4) & 15, (dy >> 4) & 15
+            for p in range(3):
+                _six_taps_run(s.views[view, p], iy, ix, py, px, length, s.sums, s.taken[r, p, place:])
     if nearest:
-        i, j = (at_x + 128) >> 8, (at_y + 128) >> 8
-        fx, fy = at_x - (i << 8), at_y - (j << 8)
-        s.scratch[5, r] = min((fx * fx + fy * fy) >> 10, 64)
-        i, j = clamped(i, width), clamped(j, height)
-        for p in range(3):
-            s.scratch[1 + p, r] = s.views[s.sources[r, 0], p, j, i]
-    else:
-        for p in range(3):
-            s.scratch[1 + p, r] = s.taken[r, p, place]
-    s.scratch[4, r] = weight
-    return weight
-
-
-@stage_kernel
-def _prefer_nearest(s, count, most):
-    """Lower the weights of samples farther from the place than the nearest of a source that sees it."""
-    closest = np.int64(64)
-    for r in range(count):
-        if 2 * s.scratch[4, r] > most:
-            closest = min(closest, s.scratch[5, r])
-    for r in range(count):
-        s.scratch[4, r] = s.scratch[4, r] * PHASE[max(s.scratch[5, r] - closest, 0)]
+        for k in range(place, place + length):
+            most = closest = np.int64(64)
+            most = np.int64(-1)
+            for r in range(count):
+                most = max(most, np.int64(s.weights[r, k]))
+            for r in range(count):
+                if 2 * np.int64(s.weights[r, k]) > most:
+                    closest = min(closest, s.near[r])
+            for r in range(count):
+                s.weights[r, k] *= PHASE[max(s.near[r] - closest, 0)]
 
 
 @part_kernel
@@ -288,89 +322,118 @@ def _six_taps_run(plane, iy, ix, py, px, count, sums, out):
     Beyond its border the plane goes on with the border's samples.
     """
     height, width = plane.shape
-    length = (count + 3) & -4
-    columns = length + TAPS - 1
-    within = ix >= BEFORE and ix - BEFORE + columns <= width
+    start, columns = ix - BEFORE, count + TAPS - 1
+    if start >= 0 and start + columns <= width:
+        if py:
+            _six_rows(plane, iy - BEFORE, start, py, columns, sums)
+        else:
+            row = plane[np.uint64(clamped(iy, height)), start : start + columns]
+            for j in range(columns):
+                sums[j] = np.int32(row[j]) * np.int32(64)
+    else:
+        for j in range(columns):
+            at, total = np.uint64(clamped(start + j, width)), np.int32(0)
+            for k in range(TAPS):
+                total += np.int32(FILTERS[py, k] * np.int32(plane[np.uint64(clamped(iy + k - BEFORE, height)), at]))
+            sums[j] = total
+    if px:
+        a, b, c = FILTERS[px, 0], FILTERS[px, 1], FILTERS[px, 2]
+        d, e, f = FILTERS[px, 3], FILTERS[px, 4], FILTERS[px, 5]
+        for j in range(count):
+            out[j] = np.int32(filtered(sums, j, a, b, c, d, e, f) + np.int32(2048)) >> np.int32(12)
+    else:
+        for j in range(count):
+            out[j] = np.int32(sums[j + BEFORE] + np.int32(32)) >> np.int32(6)
+
+
+@stage_kernel
+def _six_rows(plane, top, left, phase, columns, sums):
+    """sums[:columns] = weighted sums of six rows."""
+    height, right = plane.shape[0], left + columns
+    one, two = (
+        plane[np.uint64(clamped(top, height)), left:right],
+        plane[np.uint64(clamped(top + 1, height)), left:right],
+    )
+    three = plane[np.uint64(clamped(top + 2, height)), left:right]
+    four = plane[np.uint64(clamped(top + 3, height)), left:right]
+    five = plane[np.uint64(clamped(top + 4, height)), left:right]
+    six = plane[np.uint64(clamped(top + 5, height)), left:right]
+    a, b, c = FILTERS[phase, 0], FILTERS[phase, 1], FILTERS[phase, 2]
+    d, e, f = FILTERS[phase, 3], FILTERS[phase, 4], FILTERS[phase, 5]
     for j in range(columns):
-        sums[j] = 0
-    for k in range(TAPS):
-        g = FILTERS[py, k]
-        if g:
-            row = plane[np.uint64(clamped(iy + k - BEFORE, height))]
-            if within:
-                taken = row[ix - BEFORE : ix - BEFORE + columns]
-                for j in range(columns):
-                    sums[j] = np.int32(sums[j] + np.int32(g * np.int32(taken[j])))
-            else:
-                for j in range(columns):
-                    sums[j] += g * row[np.uint64(clamped(ix + j - BEFORE, width))]
-    a, b, c, d, e, f = FILTERS[px, 0], FILTERS[px, 1], FILTERS[px, 2], FILTERS[px, 3], FILTERS[px, 4], FILTERS[px, 5]
-    for at in range(0, length, 4):
-        t, four = sums[at : at + TAPS + 3], out[at : at + 4]
-        m, n = filtered(t, 0, a, b, c, d, e, f), filtered(t, 1, a, b, c, d, e, f)
-        o, p = filtered(t, 2, a, b, c, d, e, f), filtered(t, 3, a, b, c, d, e, f)
-        four[0], four[1], four[2], four[3] = (m + 2048) >> 12, (n + 2048) >> 12, (o + 2048) >> 12, (p + 2048) >> 12
+        far = np.int32(np.int32(a * np.int32(one[j])) + np.int32(f * np.int32(six[j])))
+        near = np.int32(np.int32(b * np.int32(two[j])) + np.int32(e * np.int32(five[j])))
+        middle = np.int32(np.int32(c * np.int32(three[j])) + np.int32(d * np.int32(four[j])))
+        sums[j] = np.int32(np.int32(far + near) + middle)
 
 
 @stage_kernel
-def _interpolate(s, y, x, length, d, count):
-    """s.taken[:count, :, :length] = samples of the sources along a disparity."""
-    for r in range(count):
-        dy, dx = led(s.sources, r, d, y, x, s.counts.shape)
-        ix, iy, px, py = x + (dx >> 8), y + (dy >> 8), (dx >> 4) & 15, (dy >> 4) & 15
-        for p in range(3):
-            _six_taps_run(s.views[s.sources[r, 0], p], iy, ix, py, px, length, s.sums, s.taken[r, p])
-
-
-@stage_kernel
-def _quotient(a, b):
-    """a // b by a division of floating point, which is exact while a has at most 52 bits, and four times as fast."""
-    return np.int64(np.floor(np.float64(a) / np.float64(b)))
-
-
-@stage_kernel
-def _apart(s, a, b):
+def _apart(one, other, k):
     """Difference of two sources' samples."""
-    differs = abs(s.scratch[1, a] - s.scratch[1, b])
-    return differs + abs(s.scratch[2, a] - s.scratch[2, b]) + abs(s.scratch[3, a] - s.scratch[3, b])
+    differs = np.int32(abs(np.int32(one[0, k] - other[0, k]))) + np.int32(abs(np.int32(one[1, k] - other[1, k])))
+    return np.int32(differs + np.int32(abs(np.int32(one[2, k] - other[2, k]))))
 
 
-@stage_kernel
-def _weighted(s, y, x, count):
-    """The mean by weights, which fall with the distance from the source in best agreement with the others.
-
-    Return the mean difference from that source.
-    """
-    totals, weights = s.scratch[9], s.scratch[4]
+@part_kernel
+def _most_alike(s, count, length):
+    """s.found[0] = the source in best agreement with the others by weight, for each of a run; the first of equals."""
+    best, least = s.found[0], s.found[1]
     for a in range(count):
-        totals[a] = -160 * weights[a]
+        total, weights = s.totals[a], s.weights[a]
+        for k in range(length):
+            total[k] = np.int32(-160) * weights[k]
         for b in range(a):
-            differs = min(_apart(s, a, b), TRUNCATED)
-            totals[a] += differs * weights[b]
-            totals[b] += differs * weights[a]
-    best = 0
+            one, other, others, theirs = s.taken[a], s.taken[b], s.totals[b], s.weights[b]
+            for k in range(length):
+                differs = np.int32(min(_apart(one, other, k), np.int32(TRUNCATED)))
+                total[k] += np.int32(differs * theirs[k])
+                others[k] += np.int32(differs * weights[k])
+    for k in range(length):
+        best[k], least[k] = 0, s.totals[0, k]
     for a in range(1, count):
-        if totals[a] < totals[best]:
-            best = a
-    sum0 = sum1 = sum2 = sum_ = all_ = spread = np.int64(0)
+        total = s.totals[a]
+        for k in range(length):
+            better = total[k] < least[k]
+            best[k] = np.int32(a) if better else best[k]
+            least[k] = total[k] if better else least[k]
+
+
+@part_kernel
+def _add_weighted(s, count, length):
+    """Sums by weights, which fall with the distance from the source found: weights, samples, and that distance."""
+    best, spread, falling, every = s.found[0], s.found[1], s.found[2], s.found[3]
+    chosen, first, second, third = s.taken[MOST_SOURCES], s.blended[0], s.blended[1], s.blended[2]
+    for k in range(length):
+        spread[k] = falling[k] = every[k] = 0
+        first[k] = second[k] = third[k] = 0
+        of = np.uint64(best[k])
+        chosen[0, k], chosen[1, k], chosen[2, k] = s.taken[of, 0, k], s.taken[of, 1, k], s.taken[of, 2, k]
     for b in range(count):
-        differs = _apart(s, best, b)
-        weight = weights[b] * OUTLYING[min(differs >> 4, 63)]
-        sum_ += weight
-        all_ += weights[b]
-        spread += min(differs, TRUNCATED) * weights[b]
-        sum0 += weight * s.scratch[1, b]
-        sum1 += weight * s.scratch[2, b]
-        sum2 += weight * s.scratch[3, b]
-    if sum_ == 0:
-        for p in range(3):
-            s.made[p, y, x] = s.scratch[1 + p, best]
-        return np.int64(0)
-    half = sum_ >> 1
-    s.made[0, y, x] = _quotient(sum0 + half, sum_)
-    s.made[1, y, x] = _quotient(sum1 + half, sum_)
-    s.made[2, y, x] = _quotient(sum2 + half, sum_)
-    return _quotient(spread, all_)
+        one, weights = s.taken[b], s.weights[b]
+        for k in range(length):
+            differs = _apart(chosen, one, k)
+            weight = np.int32(weights[k] * OUTLYING[np.uint64(min(differs >> 4, 63))])
+            spread[k] += np.int32(np.int32(min(differs, np.int32(TRUNCATED))) * weights[k])
+            falling[k] += weight
+            every[k] += weights[k]
+            share = np.float64(weight)
+            first[k] += share * np.float64(one[0, k])
+            second[k] += share * np.float64(one[1, k])
+            third[k] += share * np.float64(one[2, k])
+
+
+@part_kernel
+def _store_run(s, y, first, count):
+    """s.made = the quotients of sums, by floating point: exact, as numbers have 52 bits at most; s.doubt."""
+    spread, falling, every = s.found[1], s.found[2], s.found[3]
+    for p in range(3):
+        made, sums, chosen = s.made[p, y], s.blended[p], s.taken[MOST_SOURCES, p]
+        for k in range(count):
+            half, weights = np.float64(falling[k] >> 1), np.float64(max(falling[k], 1))
+            made[np.uint64(first + k)] = np.int64(np.floor((sums[k] + half) / weights)) if falling[k] else chosen[k]
+    for k in range(count):
+        apart = np.int64(np.floor(np.float64(spread[k]) / np.float64(max(every[k], 1)))) if falling[k] else 0
+        s.doubt[y >> 2, np.uint64((first + k) >> 2)] += (apart + 8) >> 4
 
 
 @stage_kernel
