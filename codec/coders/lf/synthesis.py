@@ -15,8 +15,7 @@ import numpy as np
 
 from ii_core.base.jit import array_kernel, lean_kernel, part_kernel, stage_kernel
 
-from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, disagreement, hashed
-from .kinds import DIFFERENT
+from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, disagreement, hashed
 from .state import EXPLICIT, INDEX, KIND, UNKNOWN, zeros
 from .transform import LARGEST
 from .warp import BEFORE, FILTERS, LATTICE, TAPS, clamped, filtered, led
@@ -272,26 +271,19 @@ def _weigh_sources(s, nearest):
 def _take_run(s, y, x, length, d, nearest, place):
     """Fill taken and weights of all sources, from ``place`` on, for samples that follow each other in a disparity."""
     height, width = s.counts.shape
-    count, most = s.sources.shape[0], np.int64(-1)
+    count = s.sources.shape[0]
     for r in range(count):
         view = s.sources[r, 0]
         dy, dx = led(s.sources, r, d, y, x, s.counts.shape)
-        far = max(abs(s.sources[r, 1]), abs(s.sources[r, 2]))
         agreeing, other, unseen = s.scratch[6, r], s.scratch[7, r], s.scratch[8, r]
-        weights, j = s.weights[r], y + ((dy + 128) >> 8)
         inside = -128 <= 256 * y + dy <= 256 * height - 128
         for k in range(length):
-            at, i = 256 * (x + k) + dx, x + k + ((dx + 128) >> 8)
-            weight = unseen
+            at, weight = 256 * (x + k) + dx, unseen
             if inside and -128 <= at <= 256 * width - 128:
-                weight = other
-                if 0 <= i < width and 0 <= j < height:
-                    known = np.int64(s.disparities[np.uint64(view), np.uint64(j), np.uint64(i)])
-                    if known != UNKNOWN and abs(known - d) * far < DIFFERENT << LATTICE:
-                        weight = agreeing
-            weights[np.uint64(place + k)] = weight
+                weight = agreeing if agrees(s, r, y, x + k, d) else other
+            s.weights[r, np.uint64(place + k)] = weight
         if nearest:
-            i = x + ((dx + 128) >> 8)
+            i, j = x + ((dx + 128) >> 8), y + ((dy + 128) >> 8)
             fx, fy = ((dx + 128) & 255) - 128, ((dy + 128) & 255) - 128
             s.near[r] = min((fx * fx + fy * fy) >> 10, 64)
             for p in range(3):
@@ -304,8 +296,7 @@ def _take_run(s, y, x, length, d, nearest, place):
                 _six_taps_run(s.views[view, p], iy, ix, py, px, length, s.sums, s.taken[r, p, place:])
     if nearest:
         for k in range(place, place + length):
-            most = closest = np.int64(64)
-            most = np.int64(-1)
+            most, closest = np.int64(-1), np.int64(64)
             for r in range(count):
                 most = max(most, np.int64(s.weights[r, k]))
             for r in range(count):
