@@ -197,7 +197,8 @@ def _best_tried(s, y, x, number, left):
 
     That of the sample to the left is looked at first: it is often best, and of others less is then computed.
     """
-    tried, best = s.tried, np.int64(0)
+    best: Any = np.int64(0)
+    tried = s.tried
     for k in range(number):
         if tried[k] == left:
             best = k
