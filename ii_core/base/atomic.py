@@ -155,6 +155,7 @@ def _create(target: Path, *, folder: bool = False) -> Path:
     pid = os.getpid()
     mark = f"ii-tmp-{_machine()}-{pid}-{_started(pid) or 0}-{secrets.token_hex(4)}"
     temporary = place / f".{target.stem[:STEM]}.{mark}{suffix}"
+    _live.add(temporary)  # first: an interrupt may come at once after the file
     try:
         _sweep(place)
         if folder:
@@ -162,8 +163,8 @@ def _create(target: Path, *, folder: bool = False) -> Path:
         else:
             os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     except OSError as error:
+        _live.discard(temporary)
         raise type(error)(f"cannot write {target}: {error.strerror}") from None
-    _live.add(temporary)
     return temporary
 
 

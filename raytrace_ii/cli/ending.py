@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from ii_core.base.atomic import remove_temporaries
 from ii_core.base.interrupt import Terminated
 
 GRACE_SECONDS = 1.5  # time limit of the cleanup, even if compiled code runs longer
@@ -46,8 +47,9 @@ def ends_soon() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
         if ended:
             told.close()  # ends the thread
-        else:  # Python waits for the threads of pools when it exits: keep the time limit until the process ends
-            told.detach()
+        else:
+            remove_temporaries()  # of which the interrupt has left the cleanup out
+            told.detach()  # Python waits for the threads of pools when it exits: the time limit stays until then
 
 
 def _terminate(number: int, frame: Any) -> None:
@@ -70,8 +72,6 @@ def _watch(heard: socket.socket, left: threading.Event) -> None:
 
 def _stop(code: int, *, said: bool) -> None:
     """End the process without waiting for threads; remove its unfinished files; print "interrupted" unless done."""
-    from ii_core.base.atomic import remove_temporaries
-
     remove_temporaries()
     if sys.stderr.isatty():
         os.write(2, SHOW_CURSOR)

@@ -25,6 +25,7 @@ from ii_core.formats.arrays import write_array
 from ii_core.picture.picture import sidecar
 from metrics import rd_chart, read_study, write_csv, write_latex, write_study
 from raytrace_ii import load_scene, render
+from raytrace_ii.cli.ending import ends_soon
 
 RNG = np.random.default_rng(5)
 
@@ -194,6 +195,27 @@ def test_only_temporary_files_of_dead_processes_are_removed(tmp_path):
     assert (tmp_path / "b.txt").read_text() == "half"
 
 
+@pytest.mark.parametrize("name", ["close", "unlink"])
+def test_an_interrupt_at_any_instruction_leaves_no_temporary_file(tmp_path, monkeypatch, name):
+    """Right after the file is there, and in the cleanup itself: the end of the command removes what is left."""
+    real = getattr(os, name)
+
+    def interrupted(*arguments, **options):
+        monkeypatch.setattr(os, name, real)
+        if name == "close":
+            real(*arguments, **options)
+        raise KeyboardInterrupt
+
+    def write():
+        monkeypatch.setattr(os, name, interrupted)
+        with atomic_path(tmp_path / "picture.png"):
+            raise ValueError("the block fails")
+
+    with pytest.raises(KeyboardInterrupt), ends_soon():
+        write()
+    assert not list(tmp_path.iterdir())
+
+
 def test_devices_and_pipes_are_neither_written_nor_read(tmp_path):
     pipe = tmp_path / "pipe.json"
     os.mkfifo(pipe)
@@ -268,6 +290,7 @@ import numpy as np
 from codec import encode
 from ii_core import IIPicture, preset
 from raytrace_ii import load_scene, render
+from raytrace_ii.cli.ending import ends_soon
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's & makes ignored
 scene, camera = load_scene("cuboid"), preset("setup1", scale=8)
