@@ -86,8 +86,9 @@ def test_views_pass_through_an_anchor(picture, name):
     if decoded.codes is not None:
         off = decoded.codes.astype(float) - codes(picture.pixels / 255)
         assert np.sqrt((off**2).mean()) < 16
-    again = coder.encode(picture, name, bpp=0.2)
-    assert again.nbytes < coded.nbytes and AnchorCoder(name).encode(picture, name, bpp=0.2).data == again.data
+    if name not in SLOW:  # each search of a rate takes them half a minute
+        again = coder.encode(picture, name, bpp=0.2)
+        assert again.nbytes < coded.nbytes and AnchorCoder(name).encode(picture, name, bpp=0.2).data == again.data
 
 
 def test_what_an_anchor_cannot_take_is_refused(picture):
