@@ -30,7 +30,7 @@ from .kernels.sampling import lobe_keys
 from .kernels.sampling import places as set_places
 from .packing import packed
 from .sample_places import fixed_places
-from .sampling import Edges, EvenRays, Parts, Shoot, fixed_sum, needed, with_rim
+from .sampling import Edges, EvenRays, Parts, Shoot, camera_rays, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
 
 ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
@@ -96,8 +96,8 @@ class Cells:
     sight: Sight
     wanted: Edges
     curve: Floats
-    m: NDArray[np.int64]
-    n: NDArray[np.int64]
+    m: Whole
+    n: Whole
     lens: NDArray[np.int64]
     own: NDArray[np.bool_]
     points: Points = field(init=False)
@@ -234,11 +234,8 @@ class Cells:
             # a body stands in its strip in the same place in all pixels
             twice[:, :number] = (twice[:, :number] + np.outer(m + 1.6 * n, SHIFTS)[:, None]) % 1.0
             kernels.strip_places(strip[some], twice, shares := np.empty(twice.shape[:2]))
-            L, D, weights = s.rays.weighted_rays_at(m[:, None], n[:, None], twice)
-            light = s.shoot(
-                L.reshape(-1, 3), D.reshape(-1, 3), None if weights is None else weights.reshape(-1),
-                numbers=(m, n, 0, count), first=None, traced=np.empty(0, np.int32),
-            )  # fmt: skip
+            rays = camera_rays(s.rays, np.repeat(m, count), np.repeat(n, count), twice.reshape(-1, 2))
+            light = s.shoot(rays, numbers=(m, n, 0, count), first=None, traced=np.empty(0, np.int32))
             kernels.add_shares(light, shares, pixels[some], self.sums)
 
     def _near_together(self, pixels: NDArray[np.int64], near: NDArray[np.float32]) -> NDArray[np.int64]:
@@ -374,9 +371,9 @@ class Cells:
         s, m, n = self.sight, self.m[places.pixel], self.n[places.pixel]
         s.check()
         within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
-        rays = s.rays.weighted_rays_at(m, n, within)
+        rays = camera_rays(s.rays, m, n, within)
         if bodies:
-            points.body[:] = s.tracer.bodies(*rays)
+            points.body[:] = s.tracer.bodies(rays)
             return
         keys = None
         if s.tracer.scene.glossy:
@@ -386,9 +383,7 @@ class Cells:
             lobe_keys(s.seed, across, down, FINEST * s.camera.pixels[0] + 1, 0, 1, keys)
         s.tracer.footprint, s.tracer.lobes = (s.width[0] / finer, s.width[1] / finer), (LOBE_RAYS, 1)
         points.light[:] = 0
-        s.tracer.run(
-            *rays[:2], points.light, Support(object_id=points.body, shading_normal=points.normal), rays[2], keys
-        )
+        s.tracer.run(rays, points.light, Support(object_id=points.body, shading_normal=points.normal), keys)
 
     def _share_out(self, pixels: NDArray[np.int64], rough: NDArray[np.float32]) -> None:
         """Find the light of pixels by sets of samples, as many as give all opened pixels the error wanted."""
@@ -499,7 +494,7 @@ def dense_mean(
     sight: Sight, wanted: Edges, rows: slice, cols: slice, order: Whole, curve: Floats
 ) -> tuple[Radiance, Whole] | None:
     """Return what `edge_mean` does for a block of fine structure, without looking for edges; None for any other."""
-    n, m = np.mgrid[rows, cols]
+    n, m = np.mgrid[rows, cols].astype(np.int32)
     k, l = sight.camera.lens_lattice.nearest(m, n)
     lens = np.asarray(l, np.int64) * sight.camera.lenses[0] + np.asarray(k, np.int64)
     cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, np.ones(lens.size, np.bool_))
@@ -534,14 +529,14 @@ def edge_mean(
     cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, own)
     inside, points, reach = np.flatnonzero(own)[order], cells.points, np.full(lens.size, np.nan, np.float32)
     assert seen.object_id is not None and seen.shading_normal is not None and seen.ray_length is not None
-    points.light[inside], points.body[inside] = centres, seen.object_id
+    found = centres.copy()  # the tracer's memory
+    points.light[inside], points.body[inside] = found, seen.object_id
     points.normal[inside], reach[inside] = seen.shading_normal, seen.ray_length
     around = np.flatnonzero(rim)
     if len(around):
         half = np.full(len(around), UNITS / 2, np.float32)
         cells.look_around(Places(around.astype(np.int32), half, half))
     opened = cells.refine(inside, reach)[inside]
-    found = centres.copy()
     found[opened] = cells.sums[inside[opened]]
     return found, cells.rays[inside]
 

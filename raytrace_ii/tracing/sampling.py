@@ -33,12 +33,14 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IICamera
 
 from .kernels import sampling as sample_kernels
+from .kernels.arrays import Start
 from .sample_places import doubling_places, fixed_places
 
 MOST_SAMPLES = 1 << 16
 
 Floats = NDArray[np.float64]
 Radiance = NDArray[np.float32]
+CameraRays = Start | tuple[Floats, Floats, Floats | None]  # by columns and rows, or L, D and shares of light
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,8 @@ def number_of_samples(wanted: Sampling) -> tuple[int, int]:
 class EvenRays:
     """Rays of a camera whose coordinates grow evenly within a pixel, as those of pinholes do.
 
-    The other fields are those of `kernels.sampling.even_rays`, which takes a sixth of the time of a camera.
+    The kernel makes them as it does those of ``centres``. The other fields are those of
+    `kernels.sampling.even_rays`, which takes a sixth of the time of a camera.
     """
 
     pixels: tuple[int, int]
@@ -118,13 +121,14 @@ class EvenRays:
     rows: Floats
     z: Floats
     steps: Floats
+    centres: Start
     samples_aperture: bool = False
 
     @classmethod
-    def of(cls, camera: IICamera) -> EvenRays | None:
-        """Return the rays of a camera; None if they are not even."""
-        centres = camera.separable_rays()
-        if centres is None or camera.samples_aperture:
+    def of(cls, camera: IICamera, start: Start | None, pose: Floats) -> EvenRays | None:
+        """Return the rays of a camera, whose centres ``start`` from tables; None if they are not even."""
+        centres = camera.separable_rays() if start is not None else None
+        if start is None or centres is None or camera.samples_aperture:
             return None
         steps = np.empty((2, 2))
         for axis, centre in enumerate(centres[:2]):
@@ -140,7 +144,14 @@ class EvenRays:
                 if not np.allclose(end, centre + far * steps[axis], rtol=1e-12, atol=slack):
                     return None
         columns, rows, z = (np.ascontiguousarray(of) for of in centres)
-        return cls(camera.pixels, columns, rows, z, steps)
+        turned = np.zeros((2, 8))  # of a step right and one down
+        for axis in range(2):
+            turned[axis, :6] = (steps[axis, :, None] * pose[:3, axis]).reshape(-1)
+        return cls(camera.pixels, columns, rows, z, steps, start._replace(steps=turned.reshape(-1)))
+
+    def start(self, m: NDArray[np.int32], n: NDArray[np.int32], within: Floats) -> Start:
+        """Return rays through places, 2·p numbers, of pixels in columns m and rows n."""
+        return self.centres._replace(rows=n, columns=m, within=within)
 
     def weighted_rays_at(
         self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), *_: ArrayLike
@@ -154,15 +165,24 @@ class EvenRays:
         return L.reshape(shape), D.reshape(shape), None
 
 
+def camera_rays(
+    camera: IICamera | EvenRays, m: NDArray[np.int32], n: NDArray[np.int32], within: Floats
+) -> CameraRays:
+    """Return rays through places (p, 2) in [0, 1]² of pixels (p,), by columns and rows where they are even."""
+    if isinstance(camera, EvenRays):
+        return camera.start(m, n, within.reshape(-1))
+    return camera.weighted_rays_at(m, n, within)
+
+
 class Shoot(Protocol):
     """Traces rays of a camera; ``first`` says that these begin their pixels.
 
     ``numbers`` are columns and rows of the pixels, the first of their samples, and how many each has; ``traced``
-    names the rays in the order in which they share packets, empty if as they come.
+    names the rays in the order in which they share packets, empty if as they come. See `Tracer.run`.
     """
 
     def __call__(
-        self, L: Floats, D: Floats, shares: Floats | None, *,
+        self, rays: CameraRays, *,
         numbers: tuple[NDArray[Any], NDArray[Any], int, int], first: slice | None, traced: NDArray[np.int32],
     ) -> NDArray[np.float32]: ...  # fmt: skip
 
@@ -179,11 +199,12 @@ def fixed_sum(
 
     The samples of a pixel stand together; those of one of its ``parts`` share packets with those of pixels beside it.
     """
+    m, n = m.astype(np.int32, copy=False), n.astype(np.int32, copy=False)
     total, table = np.zeros((len(m), 3), np.float32), fixed_places(samples)
     for some, first, many in _portions(len(m), 0, samples, batch):
         numbers = m[some], n[some], first, many
         rays, traced = _rays(camera, seed, table, *numbers, *parts(many))
-        radiance = shoot(*rays, numbers=numbers, first=some if first == 0 else None, traced=traced)
+        radiance = shoot(rays, numbers=numbers, first=some if first == 0 else None, traced=traced)
         sample_kernels.sum_samples(radiance, many, total[some])
     return total
 
@@ -197,7 +218,7 @@ def _portions(pixels: int, start: int, count: int, batch: int) -> Iterator[tuple
 
 
 def adaptive_mean(
-    camera: IICamera, wanted: Adaptive, seed: int, rows: slice, cols: slice, order: NDArray[np.int32], batch: int,
+    camera: IICamera, rays_of: IICamera | EvenRays, wanted: Adaptive, seed: int, rows: slice, cols: slice, order: NDArray[np.int32], batch: int,
     curve: Floats, parts: Parts, shoot: Shoot,
 ) -> tuple[Radiance, NDArray[np.int32]]:  # fmt: skip
     """Mean radiance (h·w, 3) of a block of pixels and the number of samples (h·w,) of each, in a given order.
@@ -231,8 +252,8 @@ def adaptive_mean(
         for block, first, many in _portions(len(which), start, count, batch):
             some = which[block]
             numbers = m[some], n[some], first, many
-            rays, traced = _rays(camera, seed, table, *numbers, *parts(many))
-            radiance = shoot(*rays, numbers=numbers, first=block if begins and first == 0 else None, traced=traced)
+            rays, traced = _rays(rays_of, seed, table, *numbers, *parts(many))
+            radiance = shoot(rays, numbers=numbers, first=block if begins and first == 0 else None, traced=traced)
             sample_kernels.add_samples(radiance, some, first, many, (start + count) // 4, quarters)
 
     inside, rim = np.flatnonzero(own), np.flatnonzero(~own & needed(lens, own))
@@ -267,7 +288,7 @@ def with_rim(camera: IICamera, rows: slice, cols: slice) -> tuple[NDArray[Any], 
     columns, lines = camera.pixels
     n, m = np.mgrid[
         max(rows.start - 1, 0) : min(rows.stop + 1, lines), max(cols.start - 1, 0) : min(cols.stop + 1, columns)
-    ]
+    ].astype(np.int32)
     k, l = camera.lens_lattice.nearest(m, n)
     return m, n, np.asarray(l, np.int64) * camera.lenses[0] + np.asarray(k, np.int64)
 
@@ -293,10 +314,10 @@ def _rays(
     count: int,
     parts: int,
     pixels: int,
-) -> tuple[tuple[Floats, Floats, Floats | None], NDArray[np.int32]]:
-    """Rays of ``count`` samples of each pixel, pixel by pixel, and the order in which they share packets.
+) -> tuple[CameraRays, NDArray[np.int32]]:
+    """Rays of ``count`` samples of each pixel, and the order in which they share packets.
 
-    What a pixel's samples have in common is computed once.
+    Even rays stand in this order, others pixel by pixel: what a pixel's samples have in common is computed once.
     """
     where: list[Floats] = []
     for pair in range(1 + camera.samples_aperture):
@@ -304,8 +325,13 @@ def _rays(
         best = table if pair == 0 else table[:0]
         sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, best, out.reshape(-1, 2))
         where.append(out)
+    even, total = isinstance(camera, EvenRays), len(m) * count
+    traced, columns, rows = (np.empty(total, np.int32) for _ in range(3))
+    within = np.empty(2 * total)
+    if parts > 1 or even:
+        sample_kernels.near_together(m, n, where[0], parts, pixels, traced, columns, rows, within)
+    if isinstance(camera, EvenRays):
+        return camera.start(columns, rows, within), traced
     L, D, shares = camera.weighted_rays_at(m[:, None], n[:, None], *where)
-    traced = np.empty(len(m) * count if parts > 1 else 0, np.int32)
-    if parts > 1:
-        sample_kernels.near_together(where[0], parts, pixels, traced)
-    return (L.reshape(-1, 3), D.reshape(-1, 3), None if shares is None else shares.reshape(-1)), traced
+    rays = L.reshape(-1, 3), D.reshape(-1, 3), None if shares is None else shares.reshape(-1)
+    return rays, traced if parts > 1 else traced[:0]

@@ -81,10 +81,11 @@ def even_rays(m, n, within, columns, rows, z, steps, locations, directions):
 
 
 @kernel
-def near_together(places, parts, pixels, out):
+def near_together(m, n, places, parts, pixels, traced, columns, rows, within):
     """Order of samples in which those of the same part of so many pixels in a row stand together.
 
-    ``places`` (p, count, 2) are the samples of each pixel, in [0, 1)²; a pixel has ``parts``² parts.
+    ``places`` (p, count, 2) are the samples of pixels (m, n), in [0, 1)²; a pixel has ``parts``² parts. ``traced``
+    gets the numbers of the samples in their order, the other arrays their pixels and places.
     """
     many, count = places.shape[0], places.shape[1]
     ends = np.empty(parts * parts + 1, np.int64)
@@ -100,7 +101,9 @@ def near_together(places, parts, pixels, out):
         for i in range(first, last):
             for j in range(count):
                 part = _part(places, i, j, parts)
-                out[row + ends[part]] = i * count + j
+                place = row + ends[part]
+                traced[place], columns[place], rows[place] = i * count + j, m[i], n[i]
+                within[2 * place], within[2 * place + 1] = places[i, j, 0], places[i, j, 1]
                 ends[part] += 1
         row += (last - first) * count
 
