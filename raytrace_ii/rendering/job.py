@@ -24,6 +24,7 @@ from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
 from ..tracing.packing import packed, share
 from ..tracing.raster import Raster, Views, parallel_views
+from ..tracing.sample_places import MOST
 from ..tracing.sampling import (
     Adaptive,
     CameraRays,
@@ -120,8 +121,16 @@ class Job:
                 for camera, support in zip(cameras, supports, strict=True)
             ]
             object.__setattr__(self, "_channels", tuple(jobs))
-        elif self.sampling == 1 and (rays := self._separable_rays()) is not None:
-            object.__setattr__(self, "_views", parallel_views(rays, self.camera.lenses, self.pose))
+        elif isinstance(self.sampling, int) and (rays := self._separable_rays()) is not None:
+            even = self._rays()
+            if self.sampling == 1:
+                views = parallel_views(rays, self.camera.lenses, self.pose)
+            elif isinstance(even, EvenRays) and even.lens[0] and self.sampling <= MOST:
+                planes = even.planes(self.seed, self.sampling)
+                views = parallel_views(rays, self.camera.lenses, self.pose, planes, even.steps)
+            else:
+                views = None
+            object.__setattr__(self, "_views", views)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (
@@ -296,6 +305,8 @@ class Job:
     ) -> NDArray[np.float32]:
         """Return the summed radiance of a tile with a fixed number of samples, in the order of the rays."""
         m, n = cols.start + order.columns, rows.start + order.rows
+        if self._views is not None and (strip := self._local.strip)[1] and samples == self.sampling:
+            return self._by_planes(tracer, rows, cols, order, support, *strip)
         if samples > 1 and isinstance(self.camera, IICamera):
             return fixed_sum(
                 self._rays(), samples, self.seed, m, n, TILE_RAYS, self._parts, self._shoot(tracer, support)
@@ -303,10 +314,7 @@ class Job:
         radiance = tracer.dark(len(order.pixels))
         start = self._start(rows, cols, order)
         if start is not None:
-            top, faces = self._local.strip if samples == self.sampling and self._views is not None else (0, None)
-            if faces is not None:
-                faces = faces[rows.start - top : rows.stop - top, cols].reshape(-1)[order.pixels]
-            tracer.run(start, radiance, support, self._keys(m, n, 0, 1), faces=faces)
+            tracer.run(start, radiance, support, self._keys(m, n, 0, 1))
             return radiance
         for sample in range(samples):
             self._check_stopped()
@@ -316,6 +324,25 @@ class Job:
                 L, D, shares = self.camera.weighted_rays(rows, cols)
             keys = self._keys(m, n, sample, 1)
             tracer.run((L, D, shares), radiance, support if sample == 0 else None, keys, order=order.pixels)
+        return radiance
+
+    def _by_planes(
+        self, tracer: Tracer, rows: slice, cols: slice, order: Order, support: Support | None, top: int,
+        planes: list[NDArray[np.int32]],
+    ) -> NDArray[np.float32]:  # fmt: skip
+        """Return the summed radiance of a tile from nearest faces, by planes of samples, from row ``top`` on."""
+        assert self._views is not None
+        m, n = cols.start + order.columns, rows.start + order.rows
+        radiance, start, even = tracer.dark(len(order.pixels)), self._start(rows, cols, order), self._rays()
+        for plane, faces in enumerate(planes):
+            self._check_stopped()
+            if isinstance(even, EvenRays) and self._views.planes:
+                across, down = (places[plane] for places in self._views.planes)
+                start = even.moved(rows, cols, across, down)._replace(rows=order.rows, columns=order.columns)
+            assert start is not None
+            some = faces[rows.start - top : rows.stop - top, cols].reshape(-1)[order.pixels]
+            seen = support if plane == 0 else None
+            tracer.run(start, radiance, seen, self._keys(m, n, plane, 1), faces=some)
         return radiance
 
     def _start(self, rows: slice, cols: slice, order: Order) -> Start | None:
@@ -349,20 +376,22 @@ class Job:
             return None  # of such a camera it would compute all to no end
         return self.camera.separable_rays()
 
-    def _strip(self, rows: slice) -> NDArray[np.int32] | None:
-        """Return the nearest faces of rows of the picture, (rows, columns); None if Embree is to find them.
+    def _strip(self, rows: slice) -> list[NDArray[np.int32]]:
+        """Return the nearest faces of rows of the picture, (rows, columns), of each plane; none if Embree finds them.
 
         Faces are listed by rows once a process, for all threads.
         """
-        centres = self._centres()
-        if self._views is None or centres is None or not self._tracer().takes_faces(centres):
-            return None
+        even, start = self._rays(), self._centres()
+        if self._views is None or start is None:
+            return []
+        if not self._tracer().takes_faces(even.centres if isinstance(even, EvenRays) else start):
+            return []
         with self._lock:
             if not self._rasters:
                 scene = packed(self.scene).intersector
                 self._rasters.append(Raster(self._views, scene.corners, scene.first_of_same))
             raster = self._rasters[0]
-        return raster.faces(rows) if raster.pays else None
+        return [raster.faces(rows, plane) for plane in range(raster.planes)] if raster.pays else []
 
     def _keys(self, m: NDArray[Any], n: NDArray[Any], first: int, count: int) -> NDArray[np.uint64] | None:
         """Return the keys of ``count`` samples of each pixel; None unless the scene is glossy."""
@@ -381,7 +410,8 @@ class Job:
         assert codes is not None
         shoot = self._shoot(tracer, support)
         return adaptive_mean(
-            self.camera, self._rays(), wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, self._parts, shoot
+            self.camera, self._rays(), wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, self._parts,
+            shoot,
         )  # fmt: skip
 
     def _edges(

@@ -229,7 +229,7 @@ class Cells:
             some = slice(start, start + s.batch // count)
             m, n = self.m[pixels[some]], self.n[pixels[some]]
             set_of = np.empty((len(m) * number, 2))
-            set_places(s.seed, m, n, s.camera.pixels[0], 0, number, 0, fixed_places(number), set_of)
+            set_places(s.seed, m, n, s.camera.pixels[0], 0, number, 0, fixed_places(number), (0, 0), set_of)
             twice = np.tile(set_of.reshape(-1, number, 2), (1, 2, 1))
             # a body stands in its strip in the same place in all pixels
             twice[:, :number] = (twice[:, :number] + np.outer(m + 1.6 * n, SHIFTS)[:, None]) % 1.0

@@ -112,8 +112,8 @@ def number_of_samples(wanted: Sampling) -> tuple[int, int]:
 class EvenRays:
     """Rays of a camera whose coordinates grow evenly within a pixel, as those of pinholes do.
 
-    The kernel makes them as it does those of ``centres``. The other fields are those of
-    `kernels.sampling.even_rays`, which takes a sixth of the time of a camera.
+    The kernel makes them as it does those of ``centres``. A ``lens`` has so many pixels, 0 if it is no whole number.
+    The other fields are those of `kernels.sampling.even_rays`, which takes a sixth of the time of a camera.
     """
 
     pixels: tuple[int, int]
@@ -122,6 +122,7 @@ class EvenRays:
     z: Floats
     steps: Floats
     centres: Start
+    lens: tuple[int, int]
     samples_aperture: bool = False
 
     @classmethod
@@ -147,11 +148,40 @@ class EvenRays:
         turned = np.zeros((2, 8))  # of a step right and one down
         for axis in range(2):
             turned[axis, :6] = (steps[axis, :, None] * pose[:3, axis]).reshape(-1)
-        return cls(camera.pixels, columns, rows, z, steps, start._replace(steps=turned.reshape(-1)))
+        (width, height), (wide, tall) = camera.pixels, camera.lenses
+        whole = min(wide, tall) > 1 and width % wide == 0 and height % tall == 0
+        lens = (width // wide, height // tall) if whole else (0, 0)
+        return cls(camera.pixels, columns, rows, z, steps, start._replace(steps=turned.reshape(-1)), lens)
 
     def start(self, m: NDArray[np.int32], n: NDArray[np.int32], within: Floats) -> Start:
         """Return rays through places, 2·p numbers, of pixels in columns m and rows n."""
         return self.centres._replace(rows=n, columns=m, within=within)
+
+    def planes(self, seed: int, samples: int) -> tuple[Floats, Floats]:
+        """Return the places of samples under a lens, (samples, U) and (samples, V), in pixels from their centres."""
+        found = []
+        for axis, many in enumerate(self.lens):
+            along, across, out = (
+                np.arange(many, dtype=np.int32),
+                np.zeros(many, np.int32),
+                np.empty((many * samples, 2)),
+            )
+            m, n = (along, across) if axis == 0 else (across, along)
+            sample_kernels.places(seed, m, n, self.pixels[0], 0, samples, 0, fixed_places(samples), self.lens, out)
+            found.append(out.reshape(many, samples, 2)[:, :, axis].T - 0.5)
+        return found[0], found[1]
+
+    def moved(self, rows: slice, cols: slice, across: Floats, down: Floats) -> Start:
+        """Return what rays of a block start from at places (U,) and (V,) under each lens, without any pixels."""
+        centres, tables = self.centres, []
+        for axis, (table, some, place) in enumerate(
+            ((centres.column_rays, cols, across), (centres.row_rays, rows, down))
+        ):
+            moved = (
+                place[np.arange(some.start, some.stop) % len(place), None] * centres.steps[8 * axis : 8 * axis + 8]
+            )
+            tables.append((table.reshape(-1, 8)[some] + moved).reshape(-1))
+        return centres._replace(column_rays=tables[0], row_rays=tables[1])
 
     def weighted_rays_at(
         self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), *_: ArrayLike
@@ -218,8 +248,8 @@ def _portions(pixels: int, start: int, count: int, batch: int) -> Iterator[tuple
 
 
 def adaptive_mean(
-    camera: IICamera, rays_of: IICamera | EvenRays, wanted: Adaptive, seed: int, rows: slice, cols: slice, order: NDArray[np.int32], batch: int,
-    curve: Floats, parts: Parts, shoot: Shoot,
+    camera: IICamera, rays_of: IICamera | EvenRays, wanted: Adaptive, seed: int, rows: slice, cols: slice,
+    order: NDArray[np.int32], batch: int, curve: Floats, parts: Parts, shoot: Shoot,
 ) -> tuple[Radiance, NDArray[np.int32]]:  # fmt: skip
     """Mean radiance (h·w, 3) of a block of pixels and the number of samples (h·w,) of each, in a given order.
 
@@ -323,7 +353,8 @@ def _rays(
     for pair in range(1 + camera.samples_aperture):
         out = np.empty((len(m), count, 2))
         best = table if pair == 0 else table[:0]
-        sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, best, out.reshape(-1, 2))
+        lens = camera.lens if isinstance(camera, EvenRays) else (0, 0)
+        sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, best, lens, out.reshape(-1, 2))
         where.append(out)
     even, total = isinstance(camera, EvenRays), len(m) * count
     traced, columns, rows = (np.empty(total, np.int32) for _ in range(3))

@@ -294,7 +294,7 @@ class Tracer:
             start, n = rays, len(rays.rows)
             room = self._primary._replace(pixels=traced if len(traced) else self._pixels)
             room.inside.fill(-1)
-            if not self.takes_faces(start):  # they are wanted before the kernel runs
+            if faces is None and not self.takes_faces(start):  # they are wanted before the kernel runs
                 start_separable_rays(start, self._work, room.origins, room.directions)
                 room.weights.fill(1)
                 start = _NO_START

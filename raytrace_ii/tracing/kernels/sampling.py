@@ -27,16 +27,22 @@ def mix_bits(h):
 
 
 @kernel
-def places(seed, m, n, columns, first, count, pair, table, out):
+def places(seed, m, n, columns, first, count, pair, table, lens, out):
     """Samples ``first`` … ``first + count`` of pixels (m, n), as rows of ``out``, pixel by pixel, in [0, 1)².
 
-    Rows of ``table`` (n, 2), turned or mirrored by a hash of seed and pixel. If it has none, a (0, 2)-sequence, van
-    der Corput's and Sobol''s, Owen-scrambled by that hash (Owen 1995; hashes of Laine and Karras 2011, Burley 2020):
-    any first 2^k samples lie one in each cell of every grid of 2^k equal cells of sides 2^-i. ``pair`` 0 is the place
-    in the pixel, 1 that on the aperture, which walks through the same sequence in another order so as not to follow
-    the first.
+    Rows of ``table`` (n, 2), turned or mirrored by a hash of seed and pixel; under a ``lens`` of so many pixels
+    mirrored across by one of seed and column under the lens, and down by one of the row. If it has no rows, a
+    (0, 2)-sequence, van der Corput's and Sobol''s, Owen-scrambled by that hash (Owen 1995; hashes of Laine and Karras
+    2011, Burley 2020): any first 2^k samples lie one in each cell of every grid of 2^k equal cells of sides 2^-i.
+    ``pair`` 0 is the place in the pixel, 1 that on the aperture, which walks through the same sequence in another
+    order so as not to follow the first.
     """
     for i in range(m.shape[0]):
+        if table.shape[0] > 0 and lens[0] > 0:
+            across = mix_bits(np.uint64(seed) ^ mix_bits(np.uint64(m[i] % lens[0]))) & np.uint64(2)
+            down = mix_bits(np.uint64(seed) ^ mix_bits(np.uint64(lens[0] + n[i] % lens[1]))) & np.uint64(4)
+            _turned(table[first : first + count], across | down, out[i * count : (i + 1) * count])
+            continue
         pixel = np.uint64(n[i]) * np.uint64(columns) + np.uint64(m[i])
         own = mix_bits(mix_bits(np.uint64(seed) ^ mix_bits(pixel)) + np.uint64(pair))
         if table.shape[0] > 0:
