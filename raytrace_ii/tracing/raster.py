@@ -27,7 +27,7 @@ _NOWHERE = 1e12  # lens pitches off: of views that fill up a room
 # Embree takes 110 ns for a ray where packets spread, and 1.3 ns more for each face whose box in the view the ray
 # meets: 1200 in hair (CPU time of eight scenes at scales 2–16 of setup1, beside other jobs, 2026-11-26).
 ROWS_OF_FACE, MOST_ROWS, ROWS_OF_BOX = 0.8, 1.1, 0.013
-MOST_ROWS_OF_PLANES = 0.25  # of sets of samples, which are near to each other in a pixel, and so are their shadow rays
+MOST_ROWS_OF_PLANES = 0.25  # of sets: samples of a pixel are nearer to each other, and so are their shadow rays
 
 Floats = NDArray[np.float64]
 _NONE = np.empty(0)
