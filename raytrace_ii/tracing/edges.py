@@ -70,7 +70,7 @@ class Sight:
     """What looks at places of a tile's pixels.
 
     ``width`` is the footprint of a pixel's ray over textures, ``pixel`` that of the pixel. ``rods`` (b, 7) are
-    ends and radii around small and thin bodies in the camera's frame; ``check`` may stop it.
+    ends and radii around small and thin bodies; ``check`` may stop it.
     """
 
     camera: IICamera
@@ -204,20 +204,18 @@ class Cells:
     def _touched(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
         """Return which pixels small bodies may be seen in, and strips (n, 6) that have them, see `kernels.strips`."""
         one = np.empty(len(pixels), np.int32)
-        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels])
-        kernels.touched(L, D, self.sight.rods, *self.sight.pixel, one)
+        kernels.touched(*self._unit_rays(pixels), self.sight.rods, *self.sight.pixel, one)
         which = np.flatnonzero(one != -1)
-        one, (L, D) = one[which], self._unit_rays(pixels[which], 0.5, 0.5)
+        one, (L, D) = one[which], self._unit_rays(pixels[which])
         right, down = (2 * (self._unit_rays(pixels[which], *at)[1] - D) for at in ((1.0, 0.5), (0.5, 1.0)))
         kernels.strips(L, D, right, down, self.sight.rods, one, strip := np.empty((len(which), 6)))
         seen = strip[:, 5] != 0
         return which[seen], strip[seen]
 
-    def _unit_rays(self, pixels: NDArray[np.int64], x: float, y: float) -> tuple[Floats, Floats]:
+    def _unit_rays(self, pixels: NDArray[np.int64], x: float = 0.5, y: float = 0.5) -> tuple[Radiance, Radiance]:
+        """Return origins and unit directions of rays through one place of pixels, in the scene's frame."""
         within = np.broadcast_to(np.array([x, y]), (len(pixels), 2))
-        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels], within)
-        length = np.linalg.norm(D, axis=-1, keepdims=True)
-        return L, np.divide(D, length, out=D, where=length > 0)
+        return self.sight.tracer.unit_rays(camera_rays(self.sight.rays, self.m[pixels], self.n[pixels], within))
 
     def _strips(self, pixels: NDArray[np.int64], strip: Floats, number: int) -> None:
         """Find the light of pixels by as many samples in the strip of a small body as around it."""
@@ -244,14 +242,12 @@ class Cells:
         Rays and shadow rays of one packet then meet the same things: they take 311 instead of 436 ns (*Apples*,
         `setup1` at scale 4, 2026-11-25). An edge belongs to the nearest body around the pixel.
         """
-        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels])
+        L, D = self._unit_rays(pixels)
         far = near[pixels]
         known = np.isfinite(far)
         far[~known] = np.median(far[known]) if known.any() else 1.0
         some = slice(None, None, -(-len(pixels) // OF_BOX))
-        length = np.linalg.norm(D[some], axis=-1)
-        ends = L[some] + D[some] * (far[some] / np.where(length > 0, length, 1.0))[:, None]
-        low, high = np.percentile(ends, (1, 99), axis=0)
+        low, high = np.percentile(L[some] + D[some] * far[some, None], (1, 99), axis=0)
         boxes = np.empty(len(pixels), np.uint16)
         kernels.boxes(L, D, far, low, 32 / np.maximum(high - low, 1e-9), boxes)
         return pixels[np.argsort(boxes, kind="stable")]
@@ -470,18 +466,15 @@ def _numbers(wanted: Floats) -> NDArray[np.int64]:
 
 
 def small_rods(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats:
-    """Return rods (b, 7) around bodies thinner than `THIN` pixels or smaller than `SMALL`.
-
-    They are ends in the camera's frame, and radii.
-    """
+    """Return rods (b, 7), ends and radii, around bodies thinner than `THIN` pixels or smaller than `SMALL`."""
     rods = packed(scene).rods
-    ends = (rods[:, :6].reshape(-1, 2, 3) - pose[:3, 3]) @ pose[:3, :3]
+    ends = rods[:, :6].reshape(-1, 2, 3)
     width, spread = pixel
-    far = np.linalg.norm(ends, axis=2).min(axis=1)
+    far = np.linalg.norm(ends - pose[:3, 3], axis=2).min(axis=1)
     across, pixels = 2 * rods[:, 6], width + spread * far
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     small = (across < THIN * pixels) | (np.maximum(across, length) < SMALL * pixels)
-    return np.column_stack([ends.reshape(-1, 6), rods[:, 6]])[small][:MOST_SMALL]
+    return rods[small][:MOST_SMALL]
 
 
 def _pilots(pixels: int) -> slice:

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ii_core import IICamera
 
@@ -112,14 +112,12 @@ def number_of_samples(wanted: Sampling) -> tuple[int, int]:
 class EvenRays:
     """Rays of a camera whose coordinates grow evenly within a pixel, as those of pinholes do.
 
-    The kernel makes them as it does those of ``centres``. A ``lens`` has so many pixels, 0 if it is no whole number.
-    The other fields are those of `kernels.sampling.even_rays`, which takes a sixth of the time of a camera.
+    The kernel makes them as it does those of ``centres``, from columns, rows and places. A ``lens`` has so many
+    pixels, 0 if it is no whole number. ``steps`` (2, 2) is how the coordinates of start and direction grow by a
+    pixel, across and down.
     """
 
     pixels: tuple[int, int]
-    columns: Floats
-    rows: Floats
-    z: Floats
     steps: Floats
     centres: Start
     lens: tuple[int, int]
@@ -144,14 +142,13 @@ class EvenRays:
             for far, end in ((-0.5, low), (0.5, high)):
                 if not np.allclose(end, centre + far * steps[axis], rtol=1e-12, atol=slack):
                     return None
-        columns, rows, z = (np.ascontiguousarray(of) for of in centres)
         turned = np.zeros((2, 8))  # of a step right and one down
         for axis in range(2):
             turned[axis, :6] = (steps[axis, :, None] * pose[:3, axis]).reshape(-1)
         (width, height), (wide, tall) = camera.pixels, camera.lenses
         whole = min(wide, tall) > 1 and width % wide == 0 and height % tall == 0
         lens = (width // wide, height // tall) if whole else (0, 0)
-        return cls(camera.pixels, columns, rows, z, steps, start._replace(steps=turned.reshape(-1)), lens)
+        return cls(camera.pixels, steps, start._replace(steps=turned.reshape(-1)), lens)
 
     def start(self, m: NDArray[np.int32], n: NDArray[np.int32], within: Floats) -> Start:
         """Return rays through places, 2·p numbers, of pixels in columns m and rows n."""
@@ -182,17 +179,6 @@ class EvenRays:
             )
             tables.append((table.reshape(-1, 8)[some] + moved).reshape(-1))
         return centres._replace(column_rays=tables[0], row_rays=tables[1])
-
-    def weighted_rays_at(
-        self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), *_: ArrayLike
-    ) -> tuple[Floats, Floats, Floats | None]:
-        """As `IICamera.weighted_rays_at`, for samples (p, 2) or (p, count, 2) of pixels (p,) or (p, 1)."""
-        m, n, within = np.asarray(m).reshape(-1), np.asarray(n).reshape(-1), np.asarray(sample, np.float64)
-        within = np.broadcast_to(within, (len(m), 2)) if within.ndim < 3 else within
-        shape, flat = (*within.shape[:-1], 3), np.ascontiguousarray(within.reshape(len(m), -1, 2))
-        L, D = np.empty((within.size // 2, 3)), np.empty((within.size // 2, 3))
-        sample_kernels.even_rays(m, n, flat, self.columns, self.rows, self.z, self.steps, L, D)
-        return L.reshape(shape), D.reshape(shape), None
 
 
 def camera_rays(

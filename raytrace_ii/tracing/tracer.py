@@ -311,17 +311,21 @@ class Tracer:
 
     def bodies(self, rays: CameraRays) -> NDArray[np.int32]:
         """Return the bodies that rays meet, −1 where none, for scenes whose rays pass no faces: `sees_bodies`."""
+        origins, directions = self.unit_rays(rays)
+        self.count.rays["primary"] += len(origins)
+        faces = self._nearest(origins, directions, placed=False).faces
+        return np.where((faces >= 0) & directions.any(axis=1), self.scene.object_of_face[faces], np.int32(-1))
+
+    def unit_rays(self, rays: CameraRays) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return origins and unit directions (n, 3) of rays in the scene's frame; 0 of rays that carry no light."""
         if isinstance(rays, Start):
-            room, n = self._primary._replace(pixels=self._pixels), len(rays.rows)
-            start_separable_rays(rays, self._work, room.origins, room.directions)
-            found = np.empty(n, np.int32)
-        else:
-            room, n = self._started(*rays, _NO_ROWS)
-            found = np.full(len(rays[0]), -1, np.int32)
-        self.count.rays["primary"] += n
-        faces = self._nearest(room.origins[:n], room.directions[:n], placed=False).faces
-        found[room.pixels[:n]] = np.where(faces >= 0, self.scene.object_of_face[faces], -1)
-        return found
+            origins, directions = np.empty((2, len(rays.rows), 3), np.float32)
+            start_separable_rays(rays, self._work, origins, directions)
+            return origins, directions
+        room, n = self._started(*rays, _NO_ROWS)
+        origins, directions = np.zeros((2, len(rays[0]), 3), np.float32)
+        origins[room.pixels[:n]], directions[room.pixels[:n]] = room.origins[:n], room.directions[:n]
+        return origins, directions
 
     @property
     def sees_bodies(self) -> bool:

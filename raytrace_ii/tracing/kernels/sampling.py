@@ -68,25 +68,6 @@ def _turned(places, bits, out):
 
 
 @kernel
-def even_rays(m, n, within, columns, rows, z, steps, locations, directions):
-    """Rays (p·count, 3) through places (p, count, 2) in [0, 1]² of pixels in columns m and rows n.
-
-    ``columns`` and ``rows`` (…, 2) are the coordinates of locations and directions of the rays through the centres,
-    ``steps`` (2, 2) how they grow by a pixel within a lens, across and down.
-    """
-    count = within.shape[1]
-    for i in range(m.shape[0]):
-        for j in range(count):
-            row, a, b = i * count + j, within[i, j, 0] - 0.5, within[i, j, 1] - 0.5
-            locations[row, 0] = columns[m[i], 0] + a * steps[0, 0]
-            locations[row, 1] = rows[n[i], 0] + b * steps[1, 0]
-            locations[row, 2] = z[0]
-            directions[row, 0] = columns[m[i], 1] + a * steps[0, 1]
-            directions[row, 1] = rows[n[i], 1] + b * steps[1, 1]
-            directions[row, 2] = z[1]
-
-
-@kernel
 def near_together(m, n, places, parts, pixels, traced, columns, rows, within):
     """Order of samples in which those of the same part of so many pixels in a row stand together.
 
