@@ -175,8 +175,8 @@ class Job:
         return tiles(self.camera, TILE_RAYS, block, whole_lenses=whole)
 
     def _tile(self, rows: slice, cols: slice) -> Block:
-        tracer = self._tracer()
         shape = rows.stop - rows.start, cols.stop - cols.start
+        tracer = self._tracer(shape[0] * shape[1])
         order = ray_order(self.camera, rows, cols, self._by_lens())
         support = self._support_room(len(order.pixels))
         if isinstance(self.sampling, Adaptive | Edges):
@@ -244,13 +244,12 @@ class Job:
                 tracer.run((L[at], D[at], some), radiance, None, self._keys(m, n, sample, 1))
         return encoded(radiance, np.arange(len(m), dtype=np.int32), self.sampling, self.dtype)
 
-    def _tracer(self) -> Tracer:
-        """Return this thread's own tracer, with counts reset."""
+    def _tracer(self, rays: int = 0) -> Tracer:
+        """Return this thread's own tracer, with counts reset, for so many rays at once: a large lens is one tile."""
         tracer: Tracer | None = getattr(self._local, "tracer", None)
-        if tracer is None:
-            tracer = self._local.tracer = Tracer(
-                self.scene, TILE_RAYS, self.pose, self._lobes(), self._footprint()
-            )  # fmt: skip
+        if tracer is None or tracer.capacity < rays:
+            capacity = max(rays, TILE_RAYS)
+            tracer = self._local.tracer = Tracer(self.scene, capacity, self.pose, self._lobes(), self._footprint())
         tracer.begin()
         return tracer
 

@@ -244,6 +244,7 @@ class Tracer:
         self.pose = pose
         self.lobes = lobes
         self.footprint = footprint if self.scene.images else (0.0, 0.0)
+        self.capacity = capacity
         self.begin()
         self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
         self._pixels = np.arange(capacity, dtype=np.int32)  # of rays one a pixel: read only
