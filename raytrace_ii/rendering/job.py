@@ -122,14 +122,11 @@ class Job:
             ]
             object.__setattr__(self, "_channels", tuple(jobs))
         elif isinstance(self.sampling, int) and (rays := self._separable_rays()) is not None:
-            even = self._rays()
+            lenses, views = self.camera.lenses, None
             if self.sampling == 1:
-                views = parallel_views(rays, self.camera.lenses, self.pose)
-            elif isinstance(even, EvenRays) and even.lens[0] and self.sampling <= MOST:
-                planes = even.planes(self.seed, self.sampling)
-                views = parallel_views(rays, self.camera.lenses, self.pose, planes, even.steps)
-            else:
-                views = None
+                views = parallel_views(rays, lenses, self.pose)
+            elif self.sampling <= MOST and isinstance(even := self._rays(), EvenRays) and even.lens[0]:
+                views = parallel_views(rays, lenses, self.pose, even.planes(self.seed, self.sampling), even.steps)
             object.__setattr__(self, "_views", views)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -332,10 +329,10 @@ class Job:
         """Return the summed radiance of a tile from nearest faces, by planes of samples, from row ``top`` on."""
         assert self._views is not None
         m, n = cols.start + order.columns, rows.start + order.rows
-        radiance, start, even = tracer.dark(len(order.pixels)), self._start(rows, cols, order), self._rays()
+        radiance, start = tracer.dark(len(order.pixels)), self._start(rows, cols, order)
         for plane, faces in enumerate(planes):
             self._check_stopped()
-            if isinstance(even, EvenRays) and self._views.planes:
+            if self._views.planes and isinstance(even := self._rays(), EvenRays):
                 across, down = (places[plane] for places in self._views.planes)
                 start = even.moved(rows, cols, across, down)._replace(rows=order.rows, columns=order.columns)
             assert start is not None
@@ -380,10 +377,10 @@ class Job:
 
         Faces are listed by rows once a process, for all threads.
         """
-        even, start = self._rays(), self._centres()
-        if self._views is None or start is None:
-            return []
-        if not self._tracer().takes_faces(even.centres if isinstance(even, EvenRays) else start):
+        start = self._centres()
+        if self._views is not None and self._views.planes and isinstance(even := self._rays(), EvenRays):
+            start = even.centres
+        if self._views is None or start is None or not self._tracer().takes_faces(start):
             return []
         with self._lock:
             if not self._rasters:

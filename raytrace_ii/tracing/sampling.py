@@ -156,29 +156,25 @@ class EvenRays:
 
     def planes(self, seed: int, samples: int) -> tuple[Floats, Floats]:
         """Return the places of samples under a lens, (samples, U) and (samples, V), in pixels from their centres."""
-        found = []
-        for axis, many in enumerate(self.lens):
-            along, across, out = (
-                np.arange(many, dtype=np.int32),
-                np.zeros(many, np.int32),
-                np.empty((many * samples, 2)),
-            )
-            m, n = (along, across) if axis == 0 else (across, along)
-            sample_kernels.places(seed, m, n, self.pixels[0], 0, samples, 0, fixed_places(samples), self.lens, out)
-            found.append(out.reshape(many, samples, 2)[:, :, axis].T - 0.5)
-        return found[0], found[1]
+        diagonal = np.arange(max(self.lens), dtype=np.int32)
+        table, out = fixed_places(samples), np.empty((len(diagonal), samples, 2))
+        sample_kernels.places(
+            seed, diagonal, diagonal, self.pixels[0], 0, samples, 0, table, self.lens, out.reshape(-1, 2)
+        )  # fmt: skip
+        across, down = (out[:many, :, axis].T - 0.5 for axis, many in enumerate(self.lens))
+        return across, down
 
     def moved(self, rows: slice, cols: slice, across: Floats, down: Floats) -> Start:
         """Return what rays of a block start from at places (U,) and (V,) under each lens, without any pixels."""
-        centres, tables = self.centres, []
-        for axis, (table, some, place) in enumerate(
-            ((centres.column_rays, cols, across), (centres.row_rays, rows, down))
-        ):
-            moved = (
-                place[np.arange(some.start, some.stop) % len(place), None] * centres.steps[8 * axis : 8 * axis + 8]
+        of, (one_right, one_down) = self.centres, self.centres.steps.reshape(2, 8)
+        columns, lines = (
+            table.reshape(-1, 8)[some] + np.outer(place[np.arange(some.start, some.stop) % len(place)], step)
+            for table, some, place, step in (
+                (of.column_rays, cols, across, one_right),
+                (of.row_rays, rows, down, one_down),
             )
-            tables.append((table.reshape(-1, 8)[some] + moved).reshape(-1))
-        return centres._replace(column_rays=tables[0], row_rays=tables[1])
+        )
+        return of._replace(column_rays=columns.reshape(-1), row_rays=lines.reshape(-1))
 
 
 def camera_rays(
