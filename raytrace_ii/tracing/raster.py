@@ -27,7 +27,6 @@ _NOWHERE = 1e12  # lens pitches off: of views that fill up a room
 # Embree takes 110 ns for a ray where packets spread, and 1.3 ns more for each face whose box in the view the ray
 # meets: 1200 in hair (CPU time of eight scenes at scales 2–16 of setup1, beside other jobs, 2026-11-26).
 ROWS_OF_FACE, MOST_ROWS, ROWS_OF_BOX = 0.8, 1.1, 0.013
-MOST_ROWS_OF_PLANES = 0.25  # of sets: samples of a pixel are nearer to each other, and so are their shadow rays
 
 Floats = NDArray[np.float64]
 _NONE = np.empty(0)
@@ -133,15 +132,16 @@ class Raster:
         self.views, self._corners, self._first_of_same = views, corners.reshape(-1), first_of_same
         rays, (columns, _) = math.prod(views.lenses) * math.prod(views.places), views.places
         self.planes = len(views.across) - 1
-        most = MOST_ROWS if self.planes == 1 else MOST_ROWS_OF_PLANES
-        self.pays = len(corners) < MOST_FACES and ROWS_OF_FACE * len(corners) <= most * rays
+        # samples of a pixel are nearer to each other, the more there are; faces are looked at once for all planes
+        most, looks = MOST_ROWS / self.planes**0.5, ROWS_OF_FACE * len(corners) / self.planes
+        self.pays = len(corners) < MOST_FACES and looks <= most * rays
         if not self.pays:
             return
         self._groups, self._views_down = -(-views.lenses[1] // GROUP), len(views.down[0]) // ROOM * BLOCK
         self._ends = np.zeros(self._groups * self._views_down, np.int64)
         rows, boxes = self._list(self._ends, np.empty(0, np.uint32))
         rows *= len(views.across[0]) // ROOM
-        self.pays = rows + ROWS_OF_FACE * len(corners) <= most * rays + ROWS_OF_BOX * boxes * columns
+        self.pays = rows + looks <= most * rays + ROWS_OF_BOX * boxes * columns
         self._lists: dict[int, NDArray[np.uint32]] = {}
         self._unseen = dict.fromkeys(range(self._groups), 0)
         self._lock = threading.Lock()

@@ -35,7 +35,6 @@ NONE = np.empty(0, np.int32)
 @pytest.fixture(autouse=True)
 def always_rasterised(monkeypatch):
     monkeypatch.setattr(raster, "MOST_ROWS", 1e9)
-    monkeypatch.setattr(raster, "MOST_ROWS_OF_PLANES", 1e9)
 
 
 def rasterised(camera, corners, pose=None, same=NONE):
