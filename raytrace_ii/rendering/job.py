@@ -24,7 +24,18 @@ from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
 from ..tracing.packing import packed, share
 from ..tracing.raster import Raster, Views, parallel_views
-from ..tracing.sampling import Adaptive, Edges, EvenRays, Sampling, Shoot, adaptive_mean, fixed_sum, number_of_samples
+from ..tracing.sample_places import MOST
+from ..tracing.sampling import (
+    Adaptive,
+    CameraRays,
+    Edges,
+    EvenRays,
+    Sampling,
+    Shoot,
+    adaptive_mean,
+    fixed_sum,
+    number_of_samples,
+)
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer, start_tables
 from .audit import FULL_DEPTH, FULL_SAMPLES, Audit, chosen, compared
 from .nearness import parts_of_pixel, pixels_are_nearer, steps_at_content
@@ -110,8 +121,13 @@ class Job:
                 for camera, support in zip(cameras, supports, strict=True)
             ]
             object.__setattr__(self, "_channels", tuple(jobs))
-        elif self.sampling == 1 and (rays := self._separable_rays()) is not None:
-            object.__setattr__(self, "_views", parallel_views(rays, self.camera.lenses, self.pose))
+        elif isinstance(self.sampling, int) and (rays := self._separable_rays()) is not None:
+            lenses, views = self.camera.lenses, None
+            if self.sampling == 1:
+                views = parallel_views(rays, lenses, self.pose)
+            elif self.sampling <= MOST and isinstance(even := self._rays(), EvenRays) and even.lens[0]:
+                views = parallel_views(rays, lenses, self.pose, even.planes(self.seed, self.sampling), even.steps)
+            object.__setattr__(self, "_views", views)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (
@@ -156,8 +172,8 @@ class Job:
         return tiles(self.camera, TILE_RAYS, block, whole_lenses=whole)
 
     def _tile(self, rows: slice, cols: slice) -> Block:
-        tracer = self._tracer()
         shape = rows.stop - rows.start, cols.stop - cols.start
+        tracer = self._tracer(shape[0] * shape[1])
         order = ray_order(self.camera, rows, cols, self._by_lens())
         support = self._support_room(len(order.pixels))
         if isinstance(self.sampling, Adaptive | Edges):
@@ -215,23 +231,22 @@ class Job:
         tracer = self._tracer()
         if isinstance(self.camera, IICamera):
             shoot, alone = self._shoot(tracer, None), lambda _: (1, 1)  # the pixels are far from each other
-            radiance = fixed_sum(self.camera, self.sampling, self.seed, m, n, TILE_RAYS, alone, shoot)
+            radiance = fixed_sum(self._rays(), self.sampling, self.seed, m, n, TILE_RAYS, alone, shoot)
         else:
             radiance = np.zeros((len(m), 3), np.float32)
             at = n - rows.start, m - cols.start
             for sample in range(self.sampling):
                 L, D, shares = self.camera.stored_rays(sample, rows, cols)
                 some = None if shares is None else shares[at]
-                tracer.run(L[at], D[at], radiance, None, some, self._keys(m, n, sample, 1))
+                tracer.run((L[at], D[at], some), radiance, None, self._keys(m, n, sample, 1))
         return encoded(radiance, np.arange(len(m), dtype=np.int32), self.sampling, self.dtype)
 
-    def _tracer(self) -> Tracer:
-        """Return this thread's own tracer, with counts reset."""
+    def _tracer(self, rays: int = 0) -> Tracer:
+        """Return this thread's own tracer, with counts reset, for so many rays at once: a large lens is one tile."""
         tracer: Tracer | None = getattr(self._local, "tracer", None)
-        if tracer is None:
-            tracer = self._local.tracer = Tracer(
-                self.scene, TILE_RAYS, self.pose, self._lobes(), self._footprint()
-            )  # fmt: skip
+        if tracer is None or tracer.capacity < rays:
+            capacity = max(rays, TILE_RAYS)
+            tracer = self._local.tracer = Tracer(self.scene, capacity, self.pose, self._lobes(), self._footprint())
         tracer.begin()
         return tracer
 
@@ -286,17 +301,16 @@ class Job:
     ) -> NDArray[np.float32]:
         """Return the summed radiance of a tile with a fixed number of samples, in the order of the rays."""
         m, n = cols.start + order.columns, rows.start + order.rows
+        if self._views is not None and (strip := self._local.strip)[1] and samples == self.sampling:
+            return self._by_planes(tracer, rows, cols, order, support, *strip)
         if samples > 1 and isinstance(self.camera, IICamera):
             return fixed_sum(
-                self.camera, samples, self.seed, m, n, TILE_RAYS, self._parts, self._shoot(tracer, support)
+                self._rays(), samples, self.seed, m, n, TILE_RAYS, self._parts, self._shoot(tracer, support)
             )  # fmt: skip
         radiance = tracer.dark(len(order.pixels))
         start = self._start(rows, cols, order)
         if start is not None:
-            top, faces = self._local.strip if samples == self.sampling and self._views is not None else (0, None)
-            if faces is not None:
-                faces = faces[rows.start - top : rows.stop - top, cols].reshape(-1)[order.pixels]
-            tracer.run_separable(start, radiance, support, self._keys(m, n, 0, 1), faces)
+            tracer.run(start, radiance, support, self._keys(m, n, 0, 1))
             return radiance
         for sample in range(samples):
             self._check_stopped()
@@ -305,7 +319,26 @@ class Job:
             else:
                 L, D, shares = self.camera.weighted_rays(rows, cols)
             keys = self._keys(m, n, sample, 1)
-            tracer.run(L, D, radiance, support if sample == 0 else None, shares, keys, order.pixels)
+            tracer.run((L, D, shares), radiance, support if sample == 0 else None, keys, order=order.pixels)
+        return radiance
+
+    def _by_planes(
+        self, tracer: Tracer, rows: slice, cols: slice, order: Order, support: Support | None, top: int,
+        planes: list[NDArray[np.int32]],
+    ) -> NDArray[np.float32]:  # fmt: skip
+        """Return the summed radiance of a tile from nearest faces, by planes of samples, from row ``top`` on."""
+        assert self._views is not None
+        m, n = cols.start + order.columns, rows.start + order.rows
+        radiance, start = tracer.dark(len(order.pixels)), self._start(rows, cols, order)
+        for plane, faces in enumerate(planes):
+            self._check_stopped()
+            if self._views.planes and isinstance(even := self._rays(), EvenRays):
+                across, down = (places[plane] for places in self._views.planes)
+                start = even.moved(rows, cols, across, down)._replace(rows=order.rows, columns=order.columns)
+            assert start is not None
+            some = faces[rows.start - top : rows.stop - top, cols].reshape(-1)[order.pixels]
+            seen = support if plane == 0 else None
+            tracer.run(start, radiance, seen, self._keys(m, n, plane, 1), faces=some)
         return radiance
 
     def _start(self, rows: slice, cols: slice, order: Order) -> Start | None:
@@ -313,15 +346,24 @@ class Job:
 
         Tables of the whole picture are computed once a thread: for every tile they would take 6 ns a pixel.
         """
-        tables = self._tables()
-        return None if tables is None else Start(*tables, order.rows, order.columns, rows.start, cols.start)
+        start = self._centres()
+        return start and start._replace(rows=order.rows, columns=order.columns, top=rows.start, left=cols.start)
 
-    def _tables(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        if not hasattr(self._local, "tables"):
+    def _rays(self) -> IICamera | EvenRays:
+        """Return what makes the rays of samples, found once a thread."""
+        if not hasattr(self._local, "rays"):
+            assert isinstance(self.camera, IICamera)
+            self._local.rays = EvenRays.of(self.camera, self._centres(), self.pose) or self.camera
+        rays: IICamera | EvenRays = self._local.rays
+        return rays
+
+    def _centres(self) -> Start | None:
+        """Return what rays through centres start from, without any pixels."""
+        if not hasattr(self._local, "centres"):
             rays = self._separable_rays()
-            self._local.tables = None if rays is None else start_tables(rays, self.pose)
-        tables: tuple[NDArray[np.float64], NDArray[np.float64]] | None = self._local.tables
-        return tables
+            self._local.centres = None if rays is None else start_tables(rays, self.pose)
+        centres: Start | None = self._local.centres
+        return centres
 
     def _separable_rays(self) -> tuple[NDArray[np.float64], ...] | None:
         """Return the rays of the picture by columns and rows; None if the camera's do not follow from them."""
@@ -330,20 +372,22 @@ class Job:
             return None  # of such a camera it would compute all to no end
         return self.camera.separable_rays()
 
-    def _strip(self, rows: slice) -> NDArray[np.int32] | None:
-        """Return the nearest faces of rows of the picture, (rows, columns); None if Embree is to find them.
+    def _strip(self, rows: slice) -> list[NDArray[np.int32]]:
+        """Return the nearest faces of rows of the picture, (rows, columns), of each plane; none if Embree finds them.
 
         Faces are listed by rows once a process, for all threads.
         """
-        tables = self._tables()
-        if self._views is None or tables is None or not self._tracer().takes_faces(tables[0], tables[1]):
-            return None
+        start = self._centres()
+        if self._views is not None and self._views.planes and isinstance(even := self._rays(), EvenRays):
+            start = even.centres
+        if self._views is None or start is None or not self._tracer().takes_faces(start):
+            return []
         with self._lock:
             if not self._rasters:
                 scene = packed(self.scene).intersector
                 self._rasters.append(Raster(self._views, scene.corners, scene.first_of_same))
             raster = self._rasters[0]
-        return raster.faces(rows) if raster.pays else None
+        return [raster.faces(rows, plane) for plane in range(raster.planes)] if raster.pays else []
 
     def _keys(self, m: NDArray[Any], n: NDArray[Any], first: int, count: int) -> NDArray[np.uint64] | None:
         """Return the keys of ``count`` samples of each pixel; None unless the scene is glossy."""
@@ -362,7 +406,8 @@ class Job:
         assert codes is not None
         shoot = self._shoot(tracer, support)
         return adaptive_mean(
-            self.camera, wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, self._parts, shoot
+            self.camera, self._rays(), wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, self._parts,
+            shoot,
         )  # fmt: skip
 
     def _edges(
@@ -390,11 +435,10 @@ class Job:
         assert isinstance(self.camera, IICamera)
         if not hasattr(self._local, "small"):
             pixel = footprint(self.camera)
-            rays = EvenRays.of(self.camera) or self.camera
-            self._local.small = pixel, small_rods(self.scene, self.pose, pixel), rays
-        pixel, rods, rays = self._local.small
+            self._local.small = pixel, small_rods(self.scene, self.pose, pixel)
+        pixel, rods = self._local.small
         return Sight(
-            self.camera, rays, tracer, self.seed, TILE_RAYS, self._footprint(), pixel, rods, self._parts,
+            self.camera, self._rays(), tracer, self.seed, TILE_RAYS, self._footprint(), pixel, rods, self._parts,
             self._shoot(tracer, None), self._check_stopped,
         )  # fmt: skip
 
@@ -402,14 +446,14 @@ class Job:
         """Return the function that traces samples of pixels and keeps support arrays of the first ones."""
 
         def shoot(
-            L: Any, D: Any, shares: Any, *, numbers: Any, first: slice | None, traced: NDArray[np.int32]
+            rays: CameraRays, *, numbers: Any, first: slice | None, traced: NDArray[np.int32]
         ) -> NDArray[np.float32]:
             self._check_stopped()
-            radiance = np.zeros((len(L), 3), np.float32)
-            room = self._support_room(len(L)) if first is not None and support is not None else None
-            tracer.run(L, D, radiance, room, shares, self._keys(*numbers), traced=traced)
+            radiance = tracer.dark(len(numbers[0]) * numbers[3])
+            room = self._support_room(len(radiance)) if first is not None and support is not None else None
+            tracer.run(rays, radiance, room, self._keys(*numbers), traced=traced)
             if room is not None and first is not None:
-                every = len(L) // (first.stop - first.start)
+                every = len(radiance) // (first.stop - first.start)
                 for name, array in vars(support).items():
                     if array is not None:
                         array[first] = getattr(room, name)[::every]

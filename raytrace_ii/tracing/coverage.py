@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .edges import Cells, Sight, _part, _places
 from .kernels import cells as kernels
 from .kernels.cells import CUT, OPEN, UNITS, Places, Points
-from .sampling import Edges, fixed_sum
+from .sampling import CameraRays, Edges, camera_rays, fixed_sum
 from .support_images import NAMES, name_hashes
 from .tracer import Support
 
@@ -35,17 +35,17 @@ class Coverage(Cells):
         self.sight.check()
         within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
         points.body[:] = self._bodies(
-            *self.sight.rays.weighted_rays_at(self.m[places.pixel], self.n[places.pixel], within)
+            camera_rays(self.sight.rays, self.m[places.pixel], self.n[places.pixel], within), len(within)
         )
         points.light[:], points.normal[:] = 0, (0, 0, 1)
         points.light[:, 0] = (points.body + 1) * LIGHT
 
-    def _bodies(self, L: Any, D: Any, shares: Any) -> NDArray[np.int32]:
+    def _bodies(self, rays: CameraRays, count: int) -> NDArray[np.int32]:
         tracer = self.sight.tracer
         if tracer.sees_bodies:
-            return tracer.bodies(L, D, shares)
-        seen = Support.empty((len(L),), {"object_id"})
-        tracer.run(L, D, np.zeros((len(L), 3), np.float32), seen, shares)
+            return tracer.bodies(rays)
+        seen = Support.empty((count,), {"object_id"})
+        tracer.run(rays, np.zeros((count, 3), np.float32), seen)
         assert seen.object_id is not None
         return seen.object_id
 
@@ -85,10 +85,11 @@ class Coverage(Cells):
     def _sampled(self, pixels: Whole) -> Shares:
         s, counted = self.sight, [np.empty(0, np.int64)]
 
-        def shoot(L: Any, D: Any, shares: Any, **_: Any) -> NDArray[np.float32]:
+        def shoot(rays: CameraRays, *, numbers: Any, **_: Any) -> NDArray[np.float32]:
             s.check()
-            counted.append(self._bodies(L, D, shares).astype(np.int64))
-            return np.zeros((len(L), 3), np.float32)
+            count = len(numbers[0]) * numbers[3]
+            counted.append(self._bodies(rays, count).astype(np.int64))
+            return np.zeros((count, 3), np.float32)
 
         fixed_sum(s.rays, SAMPLES, s.seed, self.m[pixels], self.n[pixels], s.batch, lambda _: (1, 1), shoot)
         bodies = np.concatenate(counted)
@@ -104,7 +105,7 @@ def covered(sight: Sight, rows: slice, cols: slice, order: NDArray[np.int32], na
     """
     (height, width), hashes = (rows.stop - rows.start, cols.stop - cols.start), name_hashes(names)
     unique, name_of = np.unique(hashes, return_inverse=True)
-    n, m = np.mgrid[rows, cols]
+    n, m = np.mgrid[rows, cols].astype(np.int32)
     k, l = sight.camera.lens_lattice.nearest(m, n)
     lens = np.asarray(l, np.int64) * sight.camera.lenses[0] + np.asarray(k, np.int64)
     cells = Coverage(sight, Edges(1.0), CURVE, m.ravel(), n.ravel(), lens, np.ones(height * width, np.bool_))

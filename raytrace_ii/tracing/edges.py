@@ -30,7 +30,7 @@ from .kernels.sampling import lobe_keys
 from .kernels.sampling import places as set_places
 from .packing import packed
 from .sample_places import fixed_places
-from .sampling import Edges, EvenRays, Parts, Shoot, fixed_sum, needed, with_rim
+from .sampling import Edges, EvenRays, Parts, Shoot, camera_rays, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
 
 ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
@@ -70,7 +70,7 @@ class Sight:
     """What looks at places of a tile's pixels.
 
     ``width`` is the footprint of a pixel's ray over textures, ``pixel`` that of the pixel. ``rods`` (b, 7) are
-    ends and radii around small and thin bodies in the camera's frame; ``check`` may stop it.
+    ends and radii around small and thin bodies; ``check`` may stop it.
     """
 
     camera: IICamera
@@ -96,8 +96,8 @@ class Cells:
     sight: Sight
     wanted: Edges
     curve: Floats
-    m: NDArray[np.int64]
-    n: NDArray[np.int64]
+    m: Whole
+    n: Whole
     lens: NDArray[np.int64]
     own: NDArray[np.bool_]
     points: Points = field(init=False)
@@ -204,20 +204,18 @@ class Cells:
     def _touched(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
         """Return which pixels small bodies may be seen in, and strips (n, 6) that have them, see `kernels.strips`."""
         one = np.empty(len(pixels), np.int32)
-        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels])
-        kernels.touched(L, D, self.sight.rods, *self.sight.pixel, one)
+        kernels.touched(*self._unit_rays(pixels), self.sight.rods, *self.sight.pixel, one)
         which = np.flatnonzero(one != -1)
-        one, (L, D) = one[which], self._unit_rays(pixels[which], 0.5, 0.5)
+        one, (L, D) = one[which], self._unit_rays(pixels[which])
         right, down = (2 * (self._unit_rays(pixels[which], *at)[1] - D) for at in ((1.0, 0.5), (0.5, 1.0)))
         kernels.strips(L, D, right, down, self.sight.rods, one, strip := np.empty((len(which), 6)))
         seen = strip[:, 5] != 0
         return which[seen], strip[seen]
 
-    def _unit_rays(self, pixels: NDArray[np.int64], x: float, y: float) -> tuple[Floats, Floats]:
+    def _unit_rays(self, pixels: NDArray[np.int64], x: float = 0.5, y: float = 0.5) -> tuple[Radiance, Radiance]:
+        """Return origins and unit directions of rays through one place of pixels, in the scene's frame."""
         within = np.broadcast_to(np.array([x, y]), (len(pixels), 2))
-        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels], within)
-        length = np.linalg.norm(D, axis=-1, keepdims=True)
-        return L, np.divide(D, length, out=D, where=length > 0)
+        return self.sight.tracer.unit_rays(camera_rays(self.sight.rays, self.m[pixels], self.n[pixels], within))
 
     def _strips(self, pixels: NDArray[np.int64], strip: Floats, number: int) -> None:
         """Find the light of pixels by as many samples in the strip of a small body as around it."""
@@ -229,16 +227,13 @@ class Cells:
             some = slice(start, start + s.batch // count)
             m, n = self.m[pixels[some]], self.n[pixels[some]]
             set_of = np.empty((len(m) * number, 2))
-            set_places(s.seed, m, n, s.camera.pixels[0], 0, number, 0, fixed_places(number), set_of)
+            set_places(s.seed, m, n, s.camera.pixels[0], 0, number, 0, fixed_places(number), (0, 0), set_of)
             twice = np.tile(set_of.reshape(-1, number, 2), (1, 2, 1))
             # a body stands in its strip in the same place in all pixels
             twice[:, :number] = (twice[:, :number] + np.outer(m + 1.6 * n, SHIFTS)[:, None]) % 1.0
             kernels.strip_places(strip[some], twice, shares := np.empty(twice.shape[:2]))
-            L, D, weights = s.rays.weighted_rays_at(m[:, None], n[:, None], twice)
-            light = s.shoot(
-                L.reshape(-1, 3), D.reshape(-1, 3), None if weights is None else weights.reshape(-1),
-                numbers=(m, n, 0, count), first=None, traced=np.empty(0, np.int32),
-            )  # fmt: skip
+            rays = camera_rays(s.rays, np.repeat(m, count), np.repeat(n, count), twice.reshape(-1, 2))
+            light = s.shoot(rays, numbers=(m, n, 0, count), first=None, traced=np.empty(0, np.int32))
             kernels.add_shares(light, shares, pixels[some], self.sums)
 
     def _near_together(self, pixels: NDArray[np.int64], near: NDArray[np.float32]) -> NDArray[np.int64]:
@@ -247,14 +242,12 @@ class Cells:
         Rays and shadow rays of one packet then meet the same things: they take 311 instead of 436 ns (*Apples*,
         `setup1` at scale 4, 2026-11-25). An edge belongs to the nearest body around the pixel.
         """
-        L, D, _ = self.sight.rays.weighted_rays_at(self.m[pixels], self.n[pixels])
+        L, D = self._unit_rays(pixels)
         far = near[pixels]
         known = np.isfinite(far)
         far[~known] = np.median(far[known]) if known.any() else 1.0
         some = slice(None, None, -(-len(pixels) // OF_BOX))
-        length = np.linalg.norm(D[some], axis=-1)
-        ends = L[some] + D[some] * (far[some] / np.where(length > 0, length, 1.0))[:, None]
-        low, high = np.percentile(ends, (1, 99), axis=0)
+        low, high = np.percentile(L[some] + D[some] * far[some, None], (1, 99), axis=0)
         boxes = np.empty(len(pixels), np.uint16)
         kernels.boxes(L, D, far, low, 32 / np.maximum(high - low, 1e-9), boxes)
         return pixels[np.argsort(boxes, kind="stable")]
@@ -374,9 +367,9 @@ class Cells:
         s, m, n = self.sight, self.m[places.pixel], self.n[places.pixel]
         s.check()
         within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
-        rays = s.rays.weighted_rays_at(m, n, within)
+        rays = camera_rays(s.rays, m, n, within)
         if bodies:
-            points.body[:] = s.tracer.bodies(*rays)
+            points.body[:] = s.tracer.bodies(rays)
             return
         keys = None
         if s.tracer.scene.glossy:
@@ -386,9 +379,7 @@ class Cells:
             lobe_keys(s.seed, across, down, FINEST * s.camera.pixels[0] + 1, 0, 1, keys)
         s.tracer.footprint, s.tracer.lobes = (s.width[0] / finer, s.width[1] / finer), (LOBE_RAYS, 1)
         points.light[:] = 0
-        s.tracer.run(
-            *rays[:2], points.light, Support(object_id=points.body, shading_normal=points.normal), rays[2], keys
-        )
+        s.tracer.run(rays, points.light, Support(object_id=points.body, shading_normal=points.normal), keys)
 
     def _share_out(self, pixels: NDArray[np.int64], rough: NDArray[np.float32]) -> None:
         """Find the light of pixels by sets of samples, as many as give all opened pixels the error wanted."""
@@ -475,18 +466,15 @@ def _numbers(wanted: Floats) -> NDArray[np.int64]:
 
 
 def small_rods(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats:
-    """Return rods (b, 7) around bodies thinner than `THIN` pixels or smaller than `SMALL`.
-
-    They are ends in the camera's frame, and radii.
-    """
+    """Return rods (b, 7), ends and radii, around bodies thinner than `THIN` pixels or smaller than `SMALL`."""
     rods = packed(scene).rods
-    ends = (rods[:, :6].reshape(-1, 2, 3) - pose[:3, 3]) @ pose[:3, :3]
+    ends = rods[:, :6].reshape(-1, 2, 3)
     width, spread = pixel
-    far = np.linalg.norm(ends, axis=2).min(axis=1)
+    far = np.linalg.norm(ends - pose[:3, 3], axis=2).min(axis=1)
     across, pixels = 2 * rods[:, 6], width + spread * far
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     small = (across < THIN * pixels) | (np.maximum(across, length) < SMALL * pixels)
-    return np.column_stack([ends.reshape(-1, 6), rods[:, 6]])[small][:MOST_SMALL]
+    return rods[small][:MOST_SMALL]
 
 
 def _pilots(pixels: int) -> slice:
@@ -499,7 +487,7 @@ def dense_mean(
     sight: Sight, wanted: Edges, rows: slice, cols: slice, order: Whole, curve: Floats
 ) -> tuple[Radiance, Whole] | None:
     """Return what `edge_mean` does for a block of fine structure, without looking for edges; None for any other."""
-    n, m = np.mgrid[rows, cols]
+    n, m = np.mgrid[rows, cols].astype(np.int32)
     k, l = sight.camera.lens_lattice.nearest(m, n)
     lens = np.asarray(l, np.int64) * sight.camera.lenses[0] + np.asarray(k, np.int64)
     cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, np.ones(lens.size, np.bool_))
@@ -534,14 +522,14 @@ def edge_mean(
     cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, own)
     inside, points, reach = np.flatnonzero(own)[order], cells.points, np.full(lens.size, np.nan, np.float32)
     assert seen.object_id is not None and seen.shading_normal is not None and seen.ray_length is not None
-    points.light[inside], points.body[inside] = centres, seen.object_id
+    found = centres.copy()  # the tracer's memory
+    points.light[inside], points.body[inside] = found, seen.object_id
     points.normal[inside], reach[inside] = seen.shading_normal, seen.ray_length
     around = np.flatnonzero(rim)
     if len(around):
         half = np.full(len(around), UNITS / 2, np.float32)
         cells.look_around(Places(around.astype(np.int32), half, half))
     opened = cells.refine(inside, reach)[inside]
-    found = centres.copy()
     found[opened] = cells.sums[inside[opened]]
     return found, cells.rays[inside]
 

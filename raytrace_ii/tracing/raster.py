@@ -29,22 +29,31 @@ _NOWHERE = 1e12  # lens pitches off: of views that fill up a room
 ROWS_OF_FACE, MOST_ROWS, ROWS_OF_BOX = 0.8, 1.1, 0.013
 
 Floats = NDArray[np.float64]
+_NONE = np.empty(0)
 
 
 class Views(NamedTuple):
     """Camera rays as views: offsets and slopes of columns (across) and rows (down) of a lens, see `kernels.raster`.
 
-    ``turn`` (12,) leads from the scene's millimetres to lenses across and down and lengths of a ray.
+    Those of pixels' centres come first, then those of each plane: one place in each pixel under a lens, ``planes``
+    (N, U) and (N, V), in pixels from the centres; the centres if there are none. Planes lie at most ``spread`` (2, 2)
+    from the centres: offsets and slopes, across and down. ``turn`` (12,) leads from the scene's millimetres to lenses
+    across and down and lengths of a ray.
     """
 
-    across: Floats
-    down: Floats
+    across: list[Floats]
+    down: list[Floats]
+    planes: tuple[Floats, Floats] | tuple[()]
+    spread: Floats
     places: tuple[int, int]
     lenses: tuple[int, int]
     turn: Floats
 
 
-def parallel_views(rays: tuple[Floats, ...], lenses: tuple[int, int], pose: Floats) -> Views | None:
+def parallel_views(
+    rays: tuple[Floats, ...], lenses: tuple[int, int], pose: Floats, planes: tuple[Floats, Floats] | tuple[()] = (),
+    steps: Floats = _NONE,
+) -> Views | None:  # fmt: skip
     """Return the views of a camera; None if its rays of one place are not parallel, or off an even lattice.
 
     Parameters
@@ -55,9 +64,14 @@ def parallel_views(rays: tuple[Floats, ...], lenses: tuple[int, int], pose: Floa
         Lenses across and down.
     pose : (4, 4) float
         Rigid transform from the camera's frame to the scene's.
+    planes : pair of (N, U) and (N, V) float, optional
+        As in `Views`.
+    steps : (2, 2) float
+        How the coordinates of a ray's start and direction grow by a pixel, across and down.
     """
     x, y, (start, ahead) = rays
-    rooms, places, turn = [], [], np.empty((3, 4))
+    rooms: list[list[Floats]] = []
+    places, turn, spread = [], np.empty((3, 4)), np.zeros((2, 2))
     for axis, (coordinates, count) in enumerate(zip((x, y), lenses, strict=True)):
         if count < 2 or len(coordinates) % count or not ahead:
             return None
@@ -70,15 +84,22 @@ def parallel_views(rays: tuple[Floats, ...], lenses: tuple[int, int], pose: Floa
             and pitch
         ):
             return None
-        room = np.zeros((-(-len(first) // BLOCK), ROOM // BLOCK, BLOCK))
-        of_views = np.full((2, room.shape[0] * BLOCK), [[_NOWHERE], [0.0]])
-        of_views[:, : len(first)] = first[:, 0] / pitch, first[:, 1] / pitch
-        room[:, [OFFSET // BLOCK, SLOPE // BLOCK]] = of_views.reshape(2, -1, BLOCK).swapaxes(0, 1)
-        rooms.append(room.reshape(-1))
+        moved = [first + place[:, None] * steps[axis] for place in planes[axis]] if planes else [first]
+        spread[axis] = np.max(np.abs(np.array(moved) - first), axis=(0, 1)) / abs(pitch)
+        rooms.append([_room(views / pitch) for views in (first, *moved)])
         places.append(len(first))
         turn[axis] = _row(pose, axis, 0.0, pitch)
     turn[2] = _row(pose, 2, start, ahead)
-    return Views(rooms[0], rooms[1], (places[0], places[1]), lenses, turn.reshape(-1))
+    return Views(rooms[0], rooms[1], planes, spread, (places[0], places[1]), lenses, turn.reshape(-1))
+
+
+def _room(views: Floats) -> Floats:
+    """Return rooms for views of given offsets and slopes (views, 2)."""
+    room = np.zeros((-(-len(views) // BLOCK), ROOM // BLOCK, BLOCK))
+    of_views = np.full((2, room.shape[0] * BLOCK), [[_NOWHERE], [0.0]])
+    of_views[:, : len(views)] = views.T
+    room[:, [OFFSET // BLOCK, SLOPE // BLOCK]] = of_views.reshape(2, -1, BLOCK).swapaxes(0, 1)
+    return room.reshape(-1)
 
 
 def _row(pose: Floats, axis: int, start: float, unit: float) -> Floats:
@@ -96,7 +117,7 @@ class Raster:
     """Nearest faces of the rays of a picture, found view by view.
 
     `pays` tells whether that is faster than to trace them, from counts alone: the same on every machine. Only then
-    can it return `faces`.
+    can it return `faces`, for each of its ``planes``.
 
     Parameters
     ----------
@@ -110,14 +131,17 @@ class Raster:
     def __init__(self, views: Views, corners: NDArray[np.float32], first_of_same: NDArray[np.int32]) -> None:
         self.views, self._corners, self._first_of_same = views, corners.reshape(-1), first_of_same
         rays, (columns, _) = math.prod(views.lenses) * math.prod(views.places), views.places
-        self.pays = len(corners) < MOST_FACES and ROWS_OF_FACE * len(corners) <= MOST_ROWS * rays
+        self.planes = len(views.across) - 1
+        # samples of a pixel are nearer to each other, the more there are; faces are looked at once for all planes
+        most, looks = MOST_ROWS / self.planes**0.5, ROWS_OF_FACE * len(corners) / self.planes
+        self.pays = len(corners) < MOST_FACES and looks <= most * rays
         if not self.pays:
             return
-        self._groups, self._views_down = -(-views.lenses[1] // GROUP), len(views.down) // ROOM * BLOCK
+        self._groups, self._views_down = -(-views.lenses[1] // GROUP), len(views.down[0]) // ROOM * BLOCK
         self._ends = np.zeros(self._groups * self._views_down, np.int64)
         rows, boxes = self._list(self._ends, np.empty(0, np.uint32))
-        rows *= len(views.across) // ROOM
-        self.pays = rows + ROWS_OF_FACE * len(corners) <= MOST_ROWS * rays + ROWS_OF_BOX * boxes * columns
+        rows *= len(views.across[0]) // ROOM
+        self.pays = rows + looks <= most * rays + ROWS_OF_BOX * boxes * columns
         self._lists: dict[int, NDArray[np.uint32]] = {}
         self._unseen = dict.fromkeys(range(self._groups), 0)
         self._lock = threading.Lock()
@@ -125,8 +149,8 @@ class Raster:
     def _list(self, places: NDArray[np.int64], entries: NDArray[np.uint32]) -> tuple[int, int]:
         views, counts = self.views, np.zeros(2, np.int64)
         list_faces(
-            self._corners, self._first_of_same, views.turn, views.across.copy(), views.down.copy(), views.lenses,
-            places, entries, counts,
+            self._corners, self._first_of_same, views.turn, views.across[0].copy(), views.down[0].copy(),
+            views.spread, views.lenses, places, entries, counts,
         )  # fmt: skip
         return int(counts[0]), int(counts[1])
 
@@ -141,23 +165,24 @@ class Raster:
                 for i in range(self._groups):
                     own = _pages(int(of_groups[i + 1] - of_groups[i]))
                     own[: of_groups[i + 1] - of_groups[i]] = every[of_groups[i] : of_groups[i + 1]]
-                    self._lists[i], self._unseen[i] = own, min(self.views.lenses[1] - i * GROUP, GROUP)
+                    rows = min(self.views.lenses[1] - i * GROUP, GROUP)
+                    self._lists[i], self._unseen[i] = own, rows * self.planes
             return self._lists[group]
 
     def _used(self, group: int, rows: int) -> None:
-        """Let go of the lists of a group after all its rows: the picture takes their memory."""
+        """Let go of the lists of a group after all its rows and planes: the picture takes their memory."""
         with self._lock:
             self._unseen[group] -= rows
             if self._unseen[group] <= 0:
                 self._lists.pop(group, None)
 
-    def faces(self, rows: slice) -> NDArray[np.int32]:
-        """Return the nearest face of each pixel in some rows, (rows, columns); −1 where there is none."""
+    def faces(self, rows: slice, plane: int = 0) -> NDArray[np.int32]:
+        """Return the nearest face at the place of a plane in each pixel of some rows, (rows, columns); −1 if none."""
         (columns, down), wide = self.views.places, self.views.lenses[0]
         top, bottom = rows.start // down, -(-rows.stop // down)
         out = np.empty((bottom - top, down, wide * columns), np.int32)
-        across, chosen = self.views.across.copy(), np.empty(BLOCK + 1, np.int64)
-        of_rows = self.views.down.reshape(-1, ROOM // BLOCK, BLOCK)
+        across, chosen = self.views.across[1 + plane].copy(), np.empty(BLOCK + 1, np.int64)
+        of_rows = self.views.down[1 + plane].reshape(-1, ROOM // BLOCK, BLOCK)
         offsets, slopes = (of_rows[:, part // BLOCK].reshape(-1) for part in (OFFSET, SLOPE))
         stride = CHUNK * (-(-wide // LENSES) + _SPARE)
         lines = len(across) // ROOM * BLOCK * stride

@@ -28,17 +28,19 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ii_core import IICamera
 
 from .kernels import sampling as sample_kernels
+from .kernels.arrays import Start
 from .sample_places import doubling_places, fixed_places
 
 MOST_SAMPLES = 1 << 16
 
 Floats = NDArray[np.float64]
 Radiance = NDArray[np.float32]
+CameraRays = Start | tuple[Floats, Floats, Floats | None]  # by columns and rows, or L, D and shares of light
 
 
 @dataclass(frozen=True)
@@ -110,21 +112,22 @@ def number_of_samples(wanted: Sampling) -> tuple[int, int]:
 class EvenRays:
     """Rays of a camera whose coordinates grow evenly within a pixel, as those of pinholes do.
 
-    The other fields are those of `kernels.sampling.even_rays`, which takes a sixth of the time of a camera.
+    The kernel makes them as it does those of ``centres``, from columns, rows and places. A ``lens`` has so many
+    pixels, 0 if it is no whole number. ``steps`` (2, 2) is how the coordinates of start and direction grow by a
+    pixel, across and down.
     """
 
     pixels: tuple[int, int]
-    columns: Floats
-    rows: Floats
-    z: Floats
     steps: Floats
+    centres: Start
+    lens: tuple[int, int]
     samples_aperture: bool = False
 
     @classmethod
-    def of(cls, camera: IICamera) -> EvenRays | None:
-        """Return the rays of a camera; None if they are not even."""
-        centres = camera.separable_rays()
-        if centres is None or camera.samples_aperture:
+    def of(cls, camera: IICamera, start: Start | None, pose: Floats) -> EvenRays | None:
+        """Return the rays of a camera, whose centres ``start`` from tables; None if they are not even."""
+        centres = camera.separable_rays() if start is not None else None
+        if start is None or centres is None or camera.samples_aperture:
             return None
         steps = np.empty((2, 2))
         for axis, centre in enumerate(centres[:2]):
@@ -139,30 +142,59 @@ class EvenRays:
             for far, end in ((-0.5, low), (0.5, high)):
                 if not np.allclose(end, centre + far * steps[axis], rtol=1e-12, atol=slack):
                     return None
-        columns, rows, z = (np.ascontiguousarray(of) for of in centres)
-        return cls(camera.pixels, columns, rows, z, steps)
+        turned = np.zeros((2, 8))  # of a step right and one down
+        for axis in range(2):
+            turned[axis, :6] = (steps[axis, :, None] * pose[:3, axis]).reshape(-1)
+        (width, height), (wide, tall) = camera.pixels, camera.lenses
+        whole = min(wide, tall) > 1 and width % wide == 0 and height % tall == 0
+        lens = (width // wide, height // tall) if whole else (0, 0)
+        return cls(camera.pixels, steps, start._replace(steps=turned.reshape(-1)), lens)
 
-    def weighted_rays_at(
-        self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), *_: ArrayLike
-    ) -> tuple[Floats, Floats, Floats | None]:
-        """As `IICamera.weighted_rays_at`, for samples (p, 2) or (p, count, 2) of pixels (p,) or (p, 1)."""
-        m, n, within = np.asarray(m).reshape(-1), np.asarray(n).reshape(-1), np.asarray(sample, np.float64)
-        within = np.broadcast_to(within, (len(m), 2)) if within.ndim < 3 else within
-        shape, flat = (*within.shape[:-1], 3), np.ascontiguousarray(within.reshape(len(m), -1, 2))
-        L, D = np.empty((within.size // 2, 3)), np.empty((within.size // 2, 3))
-        sample_kernels.even_rays(m, n, flat, self.columns, self.rows, self.z, self.steps, L, D)
-        return L.reshape(shape), D.reshape(shape), None
+    def start(self, m: NDArray[np.int32], n: NDArray[np.int32], within: Floats) -> Start:
+        """Return rays through places, 2·p numbers, of pixels in columns m and rows n."""
+        return self.centres._replace(rows=n, columns=m, within=within)
+
+    def planes(self, seed: int, samples: int) -> tuple[Floats, Floats]:
+        """Return the places of samples under a lens, (samples, U) and (samples, V), in pixels from their centres."""
+        diagonal = np.arange(max(self.lens), dtype=np.int32)
+        table, out = fixed_places(samples), np.empty((len(diagonal), samples, 2))
+        sample_kernels.places(
+            seed, diagonal, diagonal, self.pixels[0], 0, samples, 0, table, self.lens, out.reshape(-1, 2)
+        )  # fmt: skip
+        across, down = (out[:many, :, axis].T - 0.5 for axis, many in enumerate(self.lens))
+        return across, down
+
+    def moved(self, rows: slice, cols: slice, across: Floats, down: Floats) -> Start:
+        """Return what rays of a block start from at places (U,) and (V,) under each lens, without any pixels."""
+        of, (one_right, one_down) = self.centres, self.centres.steps.reshape(2, 8)
+        columns, lines = (
+            table.reshape(-1, 8)[some] + np.outer(place[np.arange(some.start, some.stop) % len(place)], step)
+            for table, some, place, step in (
+                (of.column_rays, cols, across, one_right),
+                (of.row_rays, rows, down, one_down),
+            )
+        )
+        return of._replace(column_rays=columns.reshape(-1), row_rays=lines.reshape(-1))
+
+
+def camera_rays(
+    camera: IICamera | EvenRays, m: NDArray[np.int32], n: NDArray[np.int32], within: Floats
+) -> CameraRays:
+    """Return rays through places (p, 2) in [0, 1]² of pixels (p,), by columns and rows where they are even."""
+    if isinstance(camera, EvenRays):
+        return camera.start(m, n, within.reshape(-1))
+    return camera.weighted_rays_at(m, n, within)
 
 
 class Shoot(Protocol):
     """Traces rays of a camera; ``first`` says that these begin their pixels.
 
     ``numbers`` are columns and rows of the pixels, the first of their samples, and how many each has; ``traced``
-    names the rays in the order in which they share packets, empty if as they come.
+    names the rays in the order in which they share packets, empty if as they come. See `Tracer.run`.
     """
 
     def __call__(
-        self, L: Floats, D: Floats, shares: Floats | None, *,
+        self, rays: CameraRays, *,
         numbers: tuple[NDArray[Any], NDArray[Any], int, int], first: slice | None, traced: NDArray[np.int32],
     ) -> NDArray[np.float32]: ...  # fmt: skip
 
@@ -179,11 +211,12 @@ def fixed_sum(
 
     The samples of a pixel stand together; those of one of its ``parts`` share packets with those of pixels beside it.
     """
+    m, n = m.astype(np.int32, copy=False), n.astype(np.int32, copy=False)
     total, table = np.zeros((len(m), 3), np.float32), fixed_places(samples)
     for some, first, many in _portions(len(m), 0, samples, batch):
         numbers = m[some], n[some], first, many
         rays, traced = _rays(camera, seed, table, *numbers, *parts(many))
-        radiance = shoot(*rays, numbers=numbers, first=some if first == 0 else None, traced=traced)
+        radiance = shoot(rays, numbers=numbers, first=some if first == 0 else None, traced=traced)
         sample_kernels.sum_samples(radiance, many, total[some])
     return total
 
@@ -197,8 +230,8 @@ def _portions(pixels: int, start: int, count: int, batch: int) -> Iterator[tuple
 
 
 def adaptive_mean(
-    camera: IICamera, wanted: Adaptive, seed: int, rows: slice, cols: slice, order: NDArray[np.int32], batch: int,
-    curve: Floats, parts: Parts, shoot: Shoot,
+    camera: IICamera, rays_of: IICamera | EvenRays, wanted: Adaptive, seed: int, rows: slice, cols: slice,
+    order: NDArray[np.int32], batch: int, curve: Floats, parts: Parts, shoot: Shoot,
 ) -> tuple[Radiance, NDArray[np.int32]]:  # fmt: skip
     """Mean radiance (h·w, 3) of a block of pixels and the number of samples (h·w,) of each, in a given order.
 
@@ -231,8 +264,8 @@ def adaptive_mean(
         for block, first, many in _portions(len(which), start, count, batch):
             some = which[block]
             numbers = m[some], n[some], first, many
-            rays, traced = _rays(camera, seed, table, *numbers, *parts(many))
-            radiance = shoot(*rays, numbers=numbers, first=block if begins and first == 0 else None, traced=traced)
+            rays, traced = _rays(rays_of, seed, table, *numbers, *parts(many))
+            radiance = shoot(rays, numbers=numbers, first=block if begins and first == 0 else None, traced=traced)
             sample_kernels.add_samples(radiance, some, first, many, (start + count) // 4, quarters)
 
     inside, rim = np.flatnonzero(own), np.flatnonzero(~own & needed(lens, own))
@@ -267,7 +300,7 @@ def with_rim(camera: IICamera, rows: slice, cols: slice) -> tuple[NDArray[Any], 
     columns, lines = camera.pixels
     n, m = np.mgrid[
         max(rows.start - 1, 0) : min(rows.stop + 1, lines), max(cols.start - 1, 0) : min(cols.stop + 1, columns)
-    ]
+    ].astype(np.int32)
     k, l = camera.lens_lattice.nearest(m, n)
     return m, n, np.asarray(l, np.int64) * camera.lenses[0] + np.asarray(k, np.int64)
 
@@ -293,19 +326,25 @@ def _rays(
     count: int,
     parts: int,
     pixels: int,
-) -> tuple[tuple[Floats, Floats, Floats | None], NDArray[np.int32]]:
-    """Rays of ``count`` samples of each pixel, pixel by pixel, and the order in which they share packets.
+) -> tuple[CameraRays, NDArray[np.int32]]:
+    """Rays of ``count`` samples of each pixel, and the order in which they share packets.
 
-    What a pixel's samples have in common is computed once.
+    Even rays stand in this order, others pixel by pixel: what a pixel's samples have in common is computed once.
     """
     where: list[Floats] = []
     for pair in range(1 + camera.samples_aperture):
         out = np.empty((len(m), count, 2))
         best = table if pair == 0 else table[:0]
-        sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, best, out.reshape(-1, 2))
+        lens = camera.lens if isinstance(camera, EvenRays) else (0, 0)
+        sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, best, lens, out.reshape(-1, 2))
         where.append(out)
+    even, total = isinstance(camera, EvenRays), len(m) * count
+    traced, columns, rows = (np.empty(total, np.int32) for _ in range(3))
+    within = np.empty(2 * total)
+    if parts > 1 or even:
+        sample_kernels.near_together(m, n, where[0], parts, pixels, traced, columns, rows, within)
+    if isinstance(camera, EvenRays):
+        return camera.start(columns, rows, within), traced
     L, D, shares = camera.weighted_rays_at(m[:, None], n[:, None], *where)
-    traced = np.empty(len(m) * count if parts > 1 else 0, np.int32)
-    if parts > 1:
-        sample_kernels.near_together(where[0], parts, pixels, traced)
-    return (L.reshape(-1, 3), D.reshape(-1, 3), None if shares is None else shares.reshape(-1)), traced
+    rays = L.reshape(-1, 3), D.reshape(-1, 3), None if shares is None else shares.reshape(-1)
+    return rays, traced if parts > 1 else traced[:0]

@@ -41,13 +41,14 @@ from .kernels.tables import (
 )  # fmt: skip
 from .kernels.way import record, way_kernel
 from .packing import PackedScene, packed
+from .sampling import CameraRays
 from .support_images import RECORDED
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
 _NO_ROWS = np.empty(0, np.int32)
 _NO_HITS = Hits(_NO_ROWS, *(np.empty(0, np.float32) for _ in range(3)))  # the kernel finds them
 _NO_NUMBERS = np.empty(0)
-_NO_START = Start(_NO_NUMBERS, _NO_NUMBERS, _NO_ROWS, _NO_ROWS, 0, 0)  # rays are in arrays
+_NO_START = Start(_NO_NUMBERS, _NO_NUMBERS, _NO_ROWS, _NO_ROWS, 0, 0, _NO_NUMBERS, _NO_NUMBERS)  # rays are in arrays
 LOBE_RAYS = 16  # over the lobe of a rough mirror, for each pixel
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
@@ -119,7 +120,7 @@ def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: Array
     radiance = np.zeros((n, 3), np.float32)
     keys = np.empty(n if packed(scene).glossy else 0, np.uint64)
     lobe_keys(0, np.arange(len(keys)), np.zeros(len(keys), np.int64), max(n, 1), 0, 1, keys)
-    tracer.run(locations, directions, radiance, Support(**seen), keys=keys if len(keys) else None)
+    tracer.run((locations, directions, None), radiance, Support(**seen), keys if len(keys) else None)
     return Traced(radiance=radiance, count=tracer.count, **seen)
 
 
@@ -153,16 +154,17 @@ class Support:
         ]
 
 
-def start_tables(
-    rays: tuple[NDArray[np.float64], ...], pose: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return what columns and rows give to rays of `IICamera.separable_rays`; None if some may be unusable."""
+def start_tables(rays: tuple[NDArray[np.float64], ...], pose: NDArray[np.float64]) -> Start | None:
+    """Return what columns and rows give to rays of `IICamera.separable_rays`, without any pixels.
+
+    None if some rays may be unusable.
+    """
     x, y, z = rays
     if not usable(x, y, z):
         return None
     columns, rows = (aligned(16 * len(part)).view(np.float64).reshape(-1, 8) for part in (x, y))
     fill_start_tables(x, y, z, pose[:3, :3], pose[:3, 3], columns, rows)
-    return columns.reshape(-1), rows.reshape(-1)
+    return _NO_START._replace(column_rays=columns.reshape(-1), row_rays=rows.reshape(-1))
 
 
 def check_scene(scene: Any) -> None:
@@ -242,6 +244,7 @@ class Tracer:
         self.pose = pose
         self.lobes = lobes
         self.footprint = footprint if self.scene.images else (0.0, 0.0)
+        self.capacity = capacity
         self.begin()
         self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
         self._pixels = np.arange(capacity, dtype=np.int32)  # of rays one a pixel: read only
@@ -250,7 +253,7 @@ class Tracer:
         self._shadow = _shadow_room(0, self.scene.nested)
         self._work = work()
         self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
-        self._told = _NO_NUMBERS, False  # whether rays of these tables may start within glass
+        self._told: tuple[Any, bool] = None, False  # whether rays of these tables may start within glass
         self._follow = way_kernel(self.scene.intersector.width)
         # hits and shadow rays that the kernel does not see to the end
         self._finds = self._tools.nearest.packet != 0 and not self.scene.passes
@@ -267,42 +270,63 @@ class Tracer:
         self.count = RayCount(embree={self.scene.intersector.about})
 
     def run(
-        self,
-        locations: NDArray[Any],
-        directions: NDArray[Any],
-        radiance: NDArray[np.float32],
-        support: Support | None,
-        shares: NDArray[np.float64] | None = None,
-        keys: NDArray[np.uint64] | None = None,
-        order: NDArray[np.int32] = _NO_ROWS,
-        traced: NDArray[np.int32] = _NO_ROWS,
-    ) -> None:
+        self, rays: CameraRays, radiance: NDArray[np.float32], support: Support | None,
+        keys: NDArray[np.uint64] | None = None, *, order: NDArray[np.int32] = _NO_ROWS,
+        traced: NDArray[np.int32] = _NO_ROWS, faces: NDArray[np.int32] | None = None,
+    ) -> None:  # fmt: skip
         """Add what each ray sees to ``radiance`` (n, 3), and fill ``support`` if given.
 
-        ``shares`` is the share of light that each ray carries; one that carries none is not traced. ``order`` names
-        the rays in the order in which they are traced: that of ``radiance``, ``support`` and ``keys``, which are
-        needed if the scene is glossy. ``traced`` names them likewise, but they keep their rows.
+        Parameters
+        ----------
+        rays : Start or tuple
+            By columns and rows of pixels; or L, D and, or None, the share of light that each ray carries: one that
+            carries none is not traced.
+        keys : (n,) uint64
+            Needed if the scene is glossy.
+        order : (n,) int32, optional
+            Names L and D in the order in which they are traced: that of ``radiance``, ``support`` and ``keys``.
+        traced : (n,) int32, optional
+            Names the rows of ``radiance``, ``support`` and ``keys`` in the order in which rays are traced, in which a
+            `Start` has them.
+        faces : (n,) int32, optional
+            The nearest ones, −1 where there is none, of a `Start` that `takes_faces`.
         """
-        room, n = self._started(locations, directions, shares, traced if len(traced) else order)
-        locations = locations.reshape(-1, 3)
-        if len(traced):
-            room.pixels[:n] = traced[room.pixels[:n]]
-        if support is not None and n < len(locations):
-            support.clear()
+        if isinstance(rays, Start):
+            start, n = rays, len(rays.rows)
+            room = self._primary._replace(pixels=traced if len(traced) else self._pixels)
+            room.inside.fill(-1)
+            if faces is None and not self.takes_faces(start):  # they are wanted before the kernel runs
+                start_separable_rays(start, self._work, room.origins, room.directions)
+                room.weights.fill(1)
+                start = _NO_START
+        else:
+            (room, n), start = self._started(*rays, traced if len(traced) else order), _NO_START
+            if len(traced):
+                room.pixels[:n] = traced[room.pixels[:n]]
+            if support is not None and n < len(radiance):
+                support.clear()
         if keys is not None:
             room.keys[:n] = keys[room.pixels[:n]]
-        self._trace(room, n, radiance, support, _NO_START)
+        hits = _NO_HITS if faces is None else Hits(faces, *self._unplaced[:, :n])
+        self._trace(room, n, radiance, support, start, hits)
 
-    def bodies(
-        self, locations: NDArray[Any], directions: NDArray[Any], shares: NDArray[np.float64] | None = None
-    ) -> NDArray[np.int32]:
+    def bodies(self, rays: CameraRays) -> NDArray[np.int32]:
         """Return the bodies that rays meet, −1 where none, for scenes whose rays pass no faces: `sees_bodies`."""
-        room, n = self._started(locations, directions, shares, _NO_ROWS)
-        self.count.rays["primary"] += n
-        faces = self._nearest(room.origins[:n], room.directions[:n], placed=False).faces
-        found = np.full(len(locations), -1, np.int32)
-        found[room.pixels[:n]] = np.where(faces >= 0, self.scene.object_of_face[faces], -1)
-        return found
+        origins, directions = self.unit_rays(rays)
+        self.count.rays["primary"] += len(origins)
+        faces = self._nearest(origins, directions, placed=False).faces
+        return np.where((faces >= 0) & directions.any(axis=1), self.scene.object_of_face[faces], np.int32(-1))
+
+    def unit_rays(self, rays: CameraRays) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return origins and unit directions (n, 3) of rays in the scene's frame; 0 of rays that carry no light."""
+        if isinstance(rays, Start):
+            origins, directions = np.empty((2, len(rays.rows), 3), np.float32)
+            start_separable_rays(rays, self._work, origins, directions)
+            return origins, directions
+        room, n = self._started(*rays, _NO_ROWS)
+        origins, directions = np.zeros((2, len(rays[0]), 3), np.float32)
+        origins[room.pixels[:n]], directions[room.pixels[:n]] = room.origins[:n], room.directions[:n]
+        return origins, directions
 
     @property
     def sees_bodies(self) -> bool:
@@ -331,37 +355,20 @@ class Tracer:
             )
         return room, n
 
-    def run_separable(
-        self, start: Start, radiance: NDArray[np.float32], support: Support | None,
-        keys: NDArray[np.uint64] | None = None, faces: NDArray[np.int32] | None = None,
-    ) -> None:  # fmt: skip
-        """`run` for rays by columns and rows of pixels.
-
-        ``faces`` are the nearest ones, −1 where there is none, of rays that `takes_faces` is true of.
-        """
-        room, n = self._primary._replace(pixels=self._pixels), len(start.rows)
-        room.inside.fill(-1)
-        if keys is not None:
-            room.keys[:n] = keys
-        if not self.takes_faces(start.column_rays, start.row_rays):  # they are wanted before the kernel runs
-            start_separable_rays(start, self._work, room.origins, room.directions)
-            room.weights.fill(1)
-            start = _NO_START
-        hits = _NO_HITS if faces is None else Hits(faces, *self._unplaced[:, :n])
-        self._trace(room, n, radiance, support, start, hits)
-
-    def takes_faces(self, column_rays: NDArray[np.float64], row_rays: NDArray[np.float64]) -> bool:
+    def takes_faces(self, start: Start) -> bool:
         """Return whether the kernel makes the camera rays of these tables, and needs no more of hits than faces."""
-        return self._finds and not self._near_glass(column_rays, row_rays)
+        return self._finds and not self._near_glass(start)
 
-    def _near_glass(self, column_rays: NDArray[np.float64], row_rays: NDArray[np.float64]) -> bool:
+    def _near_glass(self, start: Start) -> bool:
         """Return whether any camera ray of the picture may start within the bounds of a clear body."""
-        if self._told[0] is not column_rays:
-            columns, rows = (rays.reshape(-1, 8)[:, :3] for rays in (column_rays, row_rays))
+        if self._told[0] is not start.steps:
+            columns, rows = (rays.reshape(-1, 8)[:, :3] for rays in (start.column_rays, start.row_rays))
+            half_pixel = np.abs(start.steps.reshape(-1, 8)[:, :3]).sum(axis=0) / 2
             low, high = columns.min(axis=0) + rows.min(axis=0), columns.max(axis=0) + rows.max(axis=0)
             around, slack = self.scene.clear_bounds, 1e-6 * (np.abs(low) + np.abs(high))  # rays start at float32's
+            slack += half_pixel
             near = ((low - slack <= around[:, 1]) & (high + slack >= around[:, 0])).all(axis=1).any()
-            self._told = column_rays, bool(near)
+            self._told = start.steps, bool(near)
         return self._told[1]
 
     def _trace(

@@ -45,7 +45,9 @@ class Start(NamedTuple):
     """Camera rays by columns and rows of pixels: the tables of `start.fill_start_tables`, in one dimension.
 
     ``rows`` and ``columns`` are those of the pixels in the order of their rays, from ``top`` and ``left`` on; of no
-    rows if the rays come from elsewhere.
+    rows if the rays come from elsewhere. ``within`` are the rays' places in their pixels, from 0 to 1 right and down,
+    in one dimension; of no rows if rays pass the centres. ``steps`` is how a ray grows from pixel to pixel, right and
+    down, 8 numbers each as a row of the tables has.
     """
 
     column_rays: Double
@@ -54,6 +56,8 @@ class Start(NamedTuple):
     columns: Whole
     top: int
     left: int
+    within: Double
+    steps: Double
 
 
 class ShadowRays(NamedTuple):

@@ -196,13 +196,14 @@ def beyond(lens, own, steps, places):
 
 @kernel
 def boxes(locations, directions, far, low, scale, out):
-    """Numbers of those of 32³ boxes from ``low`` on in which rays end, neighbours beside each other (Morton)."""
+    """Numbers of those of 32³ boxes from ``low`` on in which rays end, neighbours beside each other (Morton).
+
+    Directions are unit vectors.
+    """
     for i in range(far.shape[0]):
-        dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        way, number = far[i] / length if length > 0.0 else 0.0, 0
+        number = 0
         for axis in range(3):
-            at = (locations[i, axis] + way * directions[i, axis] - low[axis]) * scale[axis]
+            at = (locations[i, axis] + far[i] * directions[i, axis] - low[axis]) * scale[axis]
             step = int(min(max(at, 0.0), 31.0))
             for bit in range(5):
                 number |= (step >> bit & 1) << (3 * bit + axis)
@@ -243,7 +244,7 @@ def _touches(x, y, z, u, v, w, radius, dx, dy, dz, width, spread):
 
 @kernel
 def touched(locations, directions, rods, width, spread, one):
-    """Tell which rods (two ends, radius) may be seen in pixels, by rays through their centres.
+    """Tell which rods (two ends, radius) may be seen in pixels, by rays of unit directions through their centres.
 
     ``one`` is a rod's number if it is the only one, −1 without any, −2 with several. Pixels are ``width`` wide where
     their rays start and grow by ``spread`` a mm.
@@ -252,9 +253,6 @@ def touched(locations, directions, rods, width, spread, one):
         found = -1
         lx, ly, lz = locations[i, 0], locations[i, 1], locations[i, 2]
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        scale = 1.0 / length if length > 0.0 else 0.0
-        dx, dy, dz = dx * scale, dy * scale, dz * scale
         for b in range(rods.shape[0]):
             if _touches(
                 rods[b, 0] - lx, rods[b, 1] - ly, rods[b, 2] - lz, rods[b, 3] - rods[b, 0], rods[b, 4] - rods[b, 1],

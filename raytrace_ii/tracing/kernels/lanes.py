@@ -94,7 +94,7 @@ _SINGLES = next(_offset)
 _offset = count(0, BLOCK)
 SX, SY, SZ, TOTAL, STRENGTH = _offsets(5)
 SU, SV = _offsets(2)  # place in an image
-RAY = next(_offset)  # origin and direction of a camera ray, of any length; two to spare
+RAY = next(_offset)  # origin and direction of a camera ray, of any length; its place from the middle of the pixel
 _offsets(7)
 _DOUBLES = next(_offset)
 

@@ -47,13 +47,17 @@ def seen(corners, i, turn):
 
 
 @lane_stage
-def lens_ranges(x0, s0, x1, s1, x2, s2, most, room):
-    """Set the first and last lens, up to ``most``, that may see a face in each view of a room; count those views."""
+def lens_ranges(x0, s0, x1, s1, x2, s2, most, spread, room):
+    """Set the first and last lens, up to ``most``, that may see a face in each view of a room; count those views.
+
+    ``spread`` is how far offsets and slopes of a view's planes lie from its middle at most.
+    """
+    slack = SLACK + spread[0] + spread[1] * max(max(abs(s0), abs(s1)), abs(s2))
     for k in range(BLOCK):
         slope, offset = room[SLOPE + k], room[OFFSET + k]
         a, b, c = x0 - s0 * slope - offset, x1 - s1 * slope - offset, x2 - s2 * slope - offset
-        room[FIRST + k] = np.ceil(max(min(min(a, b), c) - SLACK, 0.0))
-        room[LAST + k] = np.floor(max(min(max(max(a, b), c) + SLACK, most), -1.0))
+        room[FIRST + k] = np.ceil(max(min(min(a, b), c) - slack, 0.0))
+        room[LAST + k] = np.floor(max(min(max(max(a, b), c) + slack, most), -1.0))
     count = 0
     for k in range(BLOCK):
         count += room[FIRST + k] <= room[LAST + k]
@@ -61,9 +65,10 @@ def lens_ranges(x0, s0, x1, s1, x2, s2, most, room):
 
 
 @lane_kernel
-def list_faces(corners, first_of_same, turn, across, down, lenses, places, entries, counts):
+def list_faces(corners, first_of_same, turn, across, down, spread, lenses, places, entries, counts):
     """Count or list the faces that the rays of a group of rows of lenses may meet in each row of views.
 
+    ``spread`` (2, 2) is that of `lens_ranges` across and down.
     ``places`` has the next place of each list in ``entries``, for each group and row of views, which moves on. With
     ``entries`` of no rows, faces are counted only. ``counts`` gets the rows of all entries, and the rays of one
     column of views that lie in a box around a face.
@@ -78,13 +83,13 @@ def list_faces(corners, first_of_same, turn, across, down, lenses, places, entri
         x2, y2, s2 = seen(corners, 9 * f + 6, turn)
         found = 0
         for start in range(0, across.shape[0], ROOM):
-            found += lens_ranges(x0, s0, x1, s1, x2, s2, lenses[0] - 1.0, across[start : start + ROOM])
+            found += lens_ranges(x0, s0, x1, s1, x2, s2, lenses[0] - 1.0, spread[0], across[start : start + ROOM])
         if (found == 0) | (max(max(s0, s1), s2) < 0.0):
             continue
         wide = max(across[middle + LAST] - across[middle + FIRST] + 1.0, 0.0)
         for start in range(0, down.shape[0], ROOM):
             room = down[start : start + ROOM]
-            if lens_ranges(y0, s0, y1, s1, y2, s2, lenses[1] - 1.0, room) == 0:
+            if lens_ranges(y0, s0, y1, s1, y2, s2, lenses[1] - 1.0, spread[1], room) == 0:
                 continue
             for k in range(BLOCK):
                 first, last = np.int64(room[FIRST + k]), np.int64(room[LAST + k])
@@ -202,6 +207,8 @@ def draw_faces(corners, turn, entries, rows, top, view, room, lenses, chosen, li
             x0, y0, s0, x1, y1, s1 = x1, y1, s1, x0, y0, s0
         if y2 - y0 <= SLACK:  # seen edge-on
             continue
+        first = max(first, np.int64(np.ceil(max(y0 - SLACK, 0.0))) - top)
+        last = min(last, np.int64(np.floor(min(y2 + SLACK, top + last))) - top)
         for row in range(first, last + 1):
             ax, a, bx, b = cut(np.float64(top + row), x0, y0, s0, x1, y1, s1, x2, y2, s2)
             if max(a, b) < 0.0:

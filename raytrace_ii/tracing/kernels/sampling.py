@@ -27,16 +27,22 @@ def mix_bits(h):
 
 
 @kernel
-def places(seed, m, n, columns, first, count, pair, table, out):
+def places(seed, m, n, columns, first, count, pair, table, lens, out):
     """Samples ``first`` … ``first + count`` of pixels (m, n), as rows of ``out``, pixel by pixel, in [0, 1)².
 
-    Rows of ``table`` (n, 2), turned or mirrored by a hash of seed and pixel. If it has none, a (0, 2)-sequence, van
-    der Corput's and Sobol''s, Owen-scrambled by that hash (Owen 1995; hashes of Laine and Karras 2011, Burley 2020):
-    any first 2^k samples lie one in each cell of every grid of 2^k equal cells of sides 2^-i. ``pair`` 0 is the place
-    in the pixel, 1 that on the aperture, which walks through the same sequence in another order so as not to follow
-    the first.
+    Rows of ``table`` (n, 2), turned or mirrored by a hash of seed and pixel; under a ``lens`` of so many pixels
+    mirrored across by one of seed and column under the lens, and down by one of the row. If it has no rows, a
+    (0, 2)-sequence, van der Corput's and Sobol''s, Owen-scrambled by that hash (Owen 1995; hashes of Laine and Karras
+    2011, Burley 2020): any first 2^k samples lie one in each cell of every grid of 2^k equal cells of sides 2^-i.
+    ``pair`` 0 is the place in the pixel, 1 that on the aperture, which walks through the same sequence in another
+    order so as not to follow the first.
     """
     for i in range(m.shape[0]):
+        if table.shape[0] > 0 and lens[0] > 0:
+            across = mix_bits(np.uint64(seed) ^ mix_bits(np.uint64(m[i] % lens[0]))) & np.uint64(2)
+            down = mix_bits(np.uint64(seed) ^ mix_bits(np.uint64(lens[0] + n[i] % lens[1]))) & np.uint64(4)
+            _turned(table[first : first + count], across | down, out[i * count : (i + 1) * count])
+            continue
         pixel = np.uint64(n[i]) * np.uint64(columns) + np.uint64(m[i])
         own = mix_bits(mix_bits(np.uint64(seed) ^ mix_bits(pixel)) + np.uint64(pair))
         if table.shape[0] > 0:
@@ -62,29 +68,11 @@ def _turned(places, bits, out):
 
 
 @kernel
-def even_rays(m, n, within, columns, rows, z, steps, locations, directions):
-    """Rays (p·count, 3) through places (p, count, 2) in [0, 1]² of pixels in columns m and rows n.
-
-    ``columns`` and ``rows`` (…, 2) are the coordinates of locations and directions of the rays through the centres,
-    ``steps`` (2, 2) how they grow by a pixel within a lens, across and down.
-    """
-    count = within.shape[1]
-    for i in range(m.shape[0]):
-        for j in range(count):
-            row, a, b = i * count + j, within[i, j, 0] - 0.5, within[i, j, 1] - 0.5
-            locations[row, 0] = columns[m[i], 0] + a * steps[0, 0]
-            locations[row, 1] = rows[n[i], 0] + b * steps[1, 0]
-            locations[row, 2] = z[0]
-            directions[row, 0] = columns[m[i], 1] + a * steps[0, 1]
-            directions[row, 1] = rows[n[i], 1] + b * steps[1, 1]
-            directions[row, 2] = z[1]
-
-
-@kernel
-def near_together(places, parts, pixels, out):
+def near_together(m, n, places, parts, pixels, traced, columns, rows, within):
     """Order of samples in which those of the same part of so many pixels in a row stand together.
 
-    ``places`` (p, count, 2) are the samples of each pixel, in [0, 1)²; a pixel has ``parts``² parts.
+    ``places`` (p, count, 2) are the samples of pixels (m, n), in [0, 1)²; a pixel has ``parts``² parts. ``traced``
+    gets the numbers of the samples in their order, the other arrays their pixels and places.
     """
     many, count = places.shape[0], places.shape[1]
     ends = np.empty(parts * parts + 1, np.int64)
@@ -100,7 +88,9 @@ def near_together(places, parts, pixels, out):
         for i in range(first, last):
             for j in range(count):
                 part = _part(places, i, j, parts)
-                out[row + ends[part]] = i * count + j
+                place = row + ends[part]
+                traced[place], columns[place], rows[place] = i * count + j, m[i], n[i]
+                within[2 * place], within[2 * place + 1] = places[i, j, 0], places[i, j, 1]
                 ends[part] += 1
         row += (last - first) * count
 

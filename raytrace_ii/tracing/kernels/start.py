@@ -94,6 +94,15 @@ def start_lanes(first, lanes, start, work):
         whole[at.FACE + k] = start.top + start.rows[i]
     tables, rows = (start.column_rays, start.row_rays), (np.int64(at.TABLE_ROW), np.int64(at.FACE))
     add_rows(tables, whole, rows, double, np.int64(at.RAY))
+    if start.within.shape[0] > 0:
+        right, down = ray + 6 * BLOCK, ray + 7 * BLOCK
+        for k in range(BLOCK):
+            i = np.uint64(2 * (first + min(k, lanes - 1)))
+            double[right + k], double[down + k] = start.within[i] - 0.5, start.within[i + np.uint64(1)] - 0.5
+        for c in range(6):
+            of_column, of_row, coordinate = start.steps[c], start.steps[8 + c], ray + c * BLOCK
+            for k in range(BLOCK):
+                double[coordinate + k] += double[right + k] * of_column + double[down + k] * of_row
     for k in range(3 * BLOCK):
         single[at.START + k] = double[at.RAY + k]
         single[at.W0 + k] = _ONE

@@ -223,7 +223,7 @@ def test_few_blocks_are_under_way_at_a_time(scene):
             return future
 
     with Counting(2) as pool:
-        render(scene, preset("setup1", scale=32), executor=pool, samples=2)
+        render(scene, preset("setup1", scale=32), executor=pool, samples=(4, 4))
     assert pool.most == 2 * calls.AHEAD
 
 

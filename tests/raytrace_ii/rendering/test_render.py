@@ -111,7 +111,7 @@ def test_support_images_are_of_the_first_sample_and_as_requested(hall_scene):
 
     m, n = np.meshgrid(np.arange(128), np.arange(64))
     place = np.empty((128 * 64, 2))
-    sample_places(1, m.ravel(), n.ravel(), 128, 0, 1, 0, fixed_places(3), place)
+    sample_places(1, m.ravel(), n.ravel(), 128, 0, 1, 0, fixed_places(3), (16, 16), place)
     first = trace(hall_scene, *SMALL.rays(sample=place.reshape(64, 128, 2)))
     np.testing.assert_array_equal(full.depth.ravel(), first.depth)
     np.testing.assert_array_equal(np.isnan(full.depth), full.object_id == -1)

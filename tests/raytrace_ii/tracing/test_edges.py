@@ -12,6 +12,7 @@ import pytest
 from ii_core import IICamera, IIPicture, preset, read_maps, write_maps
 from ii_core.base.colour import srgb
 from raytrace_ii import Light, Scene, load_scene, render
+from raytrace_ii.rendering import job
 from raytrace_ii.rendering.render import render_to
 from raytrace_ii.scene.textures import Checker
 from raytrace_ii.shapes.primitives import Mesh
@@ -255,6 +256,16 @@ def test_edges_beyond_the_border_of_a_lens_are_found():
     frame = [(low, low), (high, low), (high, 16 - low), (low, 16 - low)]
     seen = by_edges(Scene(bodies=[on_wall(frame, emission=WHITE)])).picture.pixels[..., 0]
     np.testing.assert_allclose(seen, areas(frame), atol=0.03)
+
+
+def test_a_lens_of_more_pixels_than_a_tile_is_one_tile(monkeypatch):
+    options = {"samples": "edges", "error": 4.0, "support": ("coverage",), "workers": 1}
+    whole = render(hall(), SMALL, **options)
+    monkeypatch.setattr(job, "TILE_RAYS", 200)
+    tiled = render(hall(), SMALL, **options)
+    np.testing.assert_array_equal(tiled.coverage, whole.coverage)
+    off = tiled.picture.pixels.astype(int) - whole.picture.pixels
+    assert np.sqrt(np.mean(off**2)) < 4
 
 
 def test_processes_and_files_have_the_same_bits(tmp_path):

@@ -11,6 +11,8 @@ from raytrace_ii.tracing import raster
 from raytrace_ii.tracing.intersect import first_of_same
 from raytrace_ii.tracing.kernels import raster as kernels
 from raytrace_ii.tracing.raster import Raster, parallel_views
+from raytrace_ii.tracing.sampling import EvenRays
+from raytrace_ii.tracing.tracer import start_tables
 from tests.support.slow import first_fast
 from tests.support.trace_scenes import hall, sphere
 
@@ -41,14 +43,14 @@ def rasterised(camera, corners, pose=None, same=NONE):
     return Raster(views, np.ascontiguousarray(corners, np.float32), same).faces(slice(0, camera.pixels[1]))
 
 
-def met(camera, corners, pose=None):
+def met(camera, corners, pose=None, sample=(0.5, 0.5)):
     """Return of every ray and face the distance, infinite if it is missed, and how far inside the ray passes.
 
     Cramer's rule in float64. What lies within the margin outside a face counts as met. A face seen edge-on may be
     met anywhere along the ray.
     """
     pose = np.eye(4) if pose is None else pose
-    L, D = (array.reshape(-1, 3) for array in camera.rays())
+    L, D = (array.reshape(-1, 3) for array in camera.rays(sample=sample))
     L, D = L @ pose[:3, :3].T + pose[:3, 3], D @ pose[:3, :3].T
     p = np.asarray(corners, np.float32).astype(np.float64)
     a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
@@ -69,9 +71,9 @@ def met(camera, corners, pose=None):
 MARGIN, TIE, EDGE_ON = 1e-6, 1e-6, 1e-6  # of a face's side, of a distance, of sides and ray
 
 
-def assert_nearest(faces, camera, corners, pose=None, sure=0.95):
+def assert_nearest(faces, camera, corners, pose=None, sure=0.95, sample=(0.5, 0.5)):
     """Compare with all rays and faces; at an edge, or where two faces are equally near, either may count."""
-    distances, inside = met(camera, corners, pose)
+    distances, inside = met(camera, corners, pose, sample)
     faces = faces.ravel()
     nearest = np.where(inside > MARGIN, distances, np.inf)  # those that are met for sure
     right = np.where(np.isfinite(nearest.min(axis=1)), nearest.argmin(axis=1), -1)
@@ -99,6 +101,23 @@ def test_the_nearest_face_is_found_in_every_pixel(name):
         faces = rasterised(camera, corners := soup(300, 1.2, 1), pose)
         right = assert_nearest(faces, camera, corners, pose)
         assert len(np.unique(right)) > 30 and (right < 0).any()
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_the_nearest_face_is_found_at_each_place_of_a_set_of_samples(name):
+    camera, corners = CAMERAS[name], soup(300, 1.2, 1)
+    rays = camera.separable_rays()
+    even = EvenRays.of(camera, start_tables(rays, TURNED), TURNED)
+    planes = even.planes(3, 4)
+    some = Raster(parallel_views(rays, camera.lenses, TURNED, planes, even.steps), corners, NONE)
+    found = []
+    for plane in range(4):
+        across, down = (0.5 + np.tile(of[plane], many) for of, many in zip(planes, camera.lenses, strict=True))
+        places = np.stack(np.broadcast_arrays(across, down[:, None]), axis=-1)
+        found.append(some.faces(slice(0, camera.pixels[1]), plane))
+        assert_nearest(found[-1], camera, corners, TURNED, sample=places)
+    assert (found[0] != found[1]).mean() > 0.02
+    assert not some._lists
 
 
 def slivers(n=200):
@@ -225,7 +244,7 @@ def test_only_even_cameras_have_parallel_views():
 
 def traced(monkeypatch):
     """Have Embree find all hits."""
-    monkeypatch.setattr(job.Job, "_strip", lambda *_: None)
+    monkeypatch.setattr(job.Job, "_strip", lambda *_: [])
 
 
 def assert_alike(ours, theirs, ties):
@@ -246,6 +265,14 @@ def test_pictures_are_those_of_embree(name, monkeypatch):
     assert_alike(ours, render(scene, camera), 3)
 
 
+@pytest.mark.parametrize("samples", [2, 9])
+def test_sets_of_samples_are_those_of_embree(samples, monkeypatch):
+    scene, camera = hall(), preset("setup1", scale=32)
+    ours = render(scene, camera, samples=samples)
+    traced(monkeypatch)
+    assert_alike(ours, render(scene, camera, samples=samples), 3)
+
+
 def test_a_camera_in_any_pose_and_type_of_pixel(monkeypatch):
     scene, camera = hall(), preset("setup1", scale=64)
     ours = render(scene, camera, pose=TURNED, dtype="uint16")
@@ -255,16 +282,17 @@ def test_a_camera_in_any_pose_and_type_of_pixel(monkeypatch):
     assert len(np.unique(ours.picture.pixels)) > 100
 
 
-def test_same_bits_for_all_workers_tiles_and_rows(monkeypatch):
+@pytest.mark.parametrize("samples", [1, 3])
+def test_same_bits_for_all_workers_tiles_and_rows(monkeypatch, samples):
     scene, camera = hall(), preset("setup1", scale=16)
     found = []
     faces = Raster.faces
-    monkeypatch.setattr(Raster, "faces", lambda self, rows: found.append(rows) or faces(self, rows))
-    whole = render(scene, camera, workers=1)
-    assert len(found) == 2
+    monkeypatch.setattr(Raster, "faces", lambda self, *rows: found.append(rows) or faces(self, *rows))
+    whole = render(scene, camera, workers=1, samples=samples)
+    assert len(found) == 2 * samples
     for workers, rays in ((3, 65536), (2, 50), (2, 3000), (1, 10**6)):
         monkeypatch.setattr(job, "TILE_RAYS", rays)
-        again = render(scene, camera, workers=workers)
+        again = render(scene, camera, workers=workers, samples=samples)
         for name in ("depth", "normal", "object_id"):
             np.testing.assert_array_equal(getattr(again, name), getattr(whole, name))
         np.testing.assert_array_equal(again.picture.pixels, whole.picture.pixels)

@@ -10,14 +10,18 @@ from raytrace_ii import Scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.scene.textures import Checker, Noise
 from raytrace_ii.tracing.kernels import sampling as sample_kernels
+from raytrace_ii.tracing.kernels.lanes import work
+from raytrace_ii.tracing.kernels.start import start_separable_rays
 from raytrace_ii.tracing.sample_places import MOST, doubling_places, fixed_places
+from raytrace_ii.tracing.sampling import EvenRays, camera_rays
+from raytrace_ii.tracing.tracer import start_tables
 from tests.support.slow import first_fast
 from tests.support.trace_scenes import BLACK, UNIFORM, WHITE, body, hall, sphere, wall
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 ONE_LENS = IICamera(pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0)
 CODES = job.CURVES["uint8"]
-NO_TABLE = np.empty((0, 2))
+NO_TABLE, NO_LENS = np.empty((0, 2)), (0, 0)
 
 
 def codes(linear):
@@ -51,7 +55,7 @@ def test_first_samples_of_every_power_of_two_lie_one_in_each_cell_of_every_grid(
     m, n = np.array([3, 4, 8191]), np.array([5, 5, 77])
     for bits in range(9):
         out = np.empty((3 << bits, 2))
-        sample_kernels.places(7, m, n, 8192, 0, 1 << bits, pair, NO_TABLE, out)
+        sample_kernels.places(7, m, n, 8192, 0, 1 << bits, pair, NO_TABLE, NO_LENS, out)
         for points in out.reshape(3, -1, 2):
             assert (points >= 0).all() and (points < 1).all()
             for across in range(bits + 1):
@@ -64,7 +68,7 @@ def test_places_come_in_any_portions_and_differ_by_seed_pixel_and_pair():
 
     def places(seed, first, count, pair):
         out = np.empty((40 * count, 2))
-        sample_kernels.places(seed, m, n, 8, first, count, pair, NO_TABLE, out)
+        sample_kernels.places(seed, m, n, 8, first, count, pair, NO_TABLE, NO_LENS, out)
         return out.reshape(40, count, 2)
 
     whole = places(1, 0, 16, 1)
@@ -82,7 +86,7 @@ def test_places_of_a_table_are_turned_or_mirrored_alike_for_all_samples_of_a_pix
 
     def places(seed, first, count):
         out = np.empty((400 * count, 2))
-        sample_kernels.places(seed, m, n, 20, first, count, 0, table, out)
+        sample_kernels.places(seed, m, n, 20, first, count, 0, table, NO_LENS, out)
         return out.reshape(400, count, 2)
 
     whole = places(1, 0, 9)
@@ -101,7 +105,7 @@ def test_places_of_few_samples_miss_less_of_an_edge_than_the_sequence(samples):
     """Of edges of all angles 10 to 35 % less, root mean square; along rows and columns as well."""
     own = np.empty((200, samples, 2))
     pixels = np.arange(200)
-    sample_kernels.places(0, pixels, pixels, 200, 0, samples, 0, NO_TABLE, own.reshape(-1, 2))
+    sample_kernels.places(0, pixels, pixels, 200, 0, samples, 0, NO_TABLE, NO_LENS, own.reshape(-1, 2))
     chance = np.sqrt(np.mean([squares(one) for one in own], axis=0))
     table = np.sqrt(squares(fixed_places(samples)))
     assert (table < [0.9, 0.95] * chance).all()
@@ -159,11 +163,45 @@ def test_samples_of_a_part_stand_together_for_so_many_pixels(count, parts, pixel
     many = 37  # the last group has fewer pixels
     places = np.random.default_rng(5).random((many, count, 2))
     places[0, 0] = 0.0, np.nextafter(1, 0)
-    order = np.empty(many * count, np.int32)
-    sample_kernels.near_together(places, parts, pixels, order)
+    m, n = np.arange(2 * many, dtype=np.int32).reshape(2, many)
+    order, columns, rows = np.empty((3, many * count), np.int32)
+    sample_kernels.near_together(
+        m, n, places, parts, pixels, order, columns, rows, within := np.empty(2 * many * count)
+    )
     x, y = (places.reshape(-1, 2) * parts).astype(int).T
     group = np.arange(many * count) // count // pixels
     np.testing.assert_array_equal(order, np.lexsort((x, y, group)))
+    np.testing.assert_array_equal([columns, rows], [m[order // count], n[order // count]])
+    np.testing.assert_array_equal(within.reshape(-1, 2), places.reshape(-1, 2)[order])
+
+
+def test_under_lenses_of_whole_pixels_columns_and_rows_mirror_the_places():
+    """So the places of a sample under all lenses are one plane."""
+    n, m = np.mgrid[:12, :20].astype(np.int32).reshape(2, -1)
+    table, out = fixed_places(5), np.empty((240 * 5, 2))
+    sample_kernels.places(3, m, n, 20, 0, 5, 0, table, (10, 6), out)
+    found = out.reshape(2, 6, 2, 10, 5, 2)
+    np.testing.assert_array_equal(found, np.broadcast_to(found[:1, :, :1], found.shape))
+    for axis, of in ((0, found[0, 0, 0]), (1, found[0, :, 0, 0])):
+        mirrored = [np.allclose(one[:, axis], 1 - table[:, axis], atol=1e-15) for one in of]
+        assert all(m or np.array_equal(one[:, axis], table[:, axis]) for m, one in zip(mirrored, of, strict=True))
+        assert 0 < sum(mirrored) < len(mirrored)
+
+
+@pytest.mark.parametrize("start_mm", [0.0, 3.0])
+def test_rays_by_columns_rows_and_places_are_those_of_the_camera(start_mm):
+    camera = IICamera(pixels=(60, 40), lenses=(15, 10), pixel_pitch_mm=0.1, gap_mm=2.0, start_mm=start_mm)
+    pose, random = np.eye(4), np.random.default_rng(1)
+    pose[:3, :3] = [[0.96, 0, 0.28], [0, 1, 0], [-0.28, 0, 0.96]]
+    pose[:3, 3] = 1.5, -0.7, -2
+    even = EvenRays.of(camera, start_tables(camera.separable_rays(), pose), pose)
+    m, n = (random.integers(0, size, 50, dtype=np.int32) for size in camera.pixels)
+    within, (origins, directions) = random.random((50, 2)), np.empty((2, 50, 3), np.float32)
+    start_separable_rays(camera_rays(even, m, n, within), work(), origins, directions)
+    L, D, _ = camera.weighted_rays_at(m, n, within)
+    np.testing.assert_allclose(origins, L @ pose[:3, :3].T + pose[:3, 3], rtol=3e-7, atol=1e-6)
+    unit = D / np.linalg.norm(D, axis=1, keepdims=True)
+    np.testing.assert_allclose(directions, unit @ pose[:3, :3].T, rtol=3e-7, atol=1e-7)
 
 
 def test_a_flat_scene_stays_at_the_least():
@@ -267,7 +305,7 @@ def test_support_images_are_those_of_the_first_sample():
     shot = adaptive(scene, SMALL, seed=5, support=("depth", "normal", "object_id", "ray_length"))
     m, n = np.meshgrid(np.arange(128), np.arange(64))
     place = np.empty((128 * 64, 2))
-    sample_kernels.places(5, m.ravel(), n.ravel(), 128, 0, 1, 0, NO_TABLE, place)
+    sample_kernels.places(5, m.ravel(), n.ravel(), 128, 0, 1, 0, NO_TABLE, NO_LENS, place)
     seen = trace(scene, *SMALL.rays(sample=place.reshape(64, 128, 2)))
     for name in ("depth", "normal", "object_id", "ray_length"):
         np.testing.assert_array_equal(getattr(shot, name).reshape(getattr(seen, name).shape), getattr(seen, name))

@@ -16,7 +16,7 @@ from raytrace_ii.tracing import tracer
 from raytrace_ii.tracing.embree import lane_masks
 from raytrace_ii.tracing.intersect import Intersector, first_of_same
 from raytrace_ii.tracing.kernels import appearance, attributes, sky, spawn, way
-from raytrace_ii.tracing.kernels.arrays import ShadowRays, Start
+from raytrace_ii.tracing.kernels.arrays import ShadowRays
 from raytrace_ii.tracing.kernels.lanes import work
 from raytrace_ii.tracing.kernels.light import keep_unblocked
 from raytrace_ii.tracing.kernels.media import fresnel
@@ -156,7 +156,8 @@ def test_rays_by_row_and_column_are_those_one_by_one():
     pixels, inside = np.empty(35, np.int32), np.empty((35, 0), np.int32)
     order = rng.permutation(35).astype(np.int32)
     start_rays(*grid.reshape(2, 35, 3), np.empty(0), order, turn, np.arange(3.0), *expected, pixels, inside)
-    start = Start(*tracer.start_tables((x, y, z), pose), order // 5 - 1, order % 5 - 2, 1, 2)
+    start = tracer.start_tables((x, y, z), pose)
+    start = start._replace(rows=order // 5 - 1, columns=order % 5 - 2, top=1, left=2)
     for function in (start_separable_rays, start_separable_rays.py_func):
         found = [np.empty((35, 3), np.float32) for _ in range(2)]
         function(start, work(), *found)
