@@ -161,23 +161,26 @@ def _in_order(low, high):
 
 
 @lean_kernel
-def add_evidence(views, disparity, limit, smooth, push, weight, mean, first, last):
+def add_evidence(views, disparity, limit, smooth, here, push, weight, mean, first, last):
     """Add up a Gauss–Newton step by quarters of views: d + Σpush/Σweight is a pixel's least-squares disparity.
 
     A view's weight is 1/(1 + r²/limit²)², r² its squared difference, ``smooth`` (3, H, W) the image of the gradients.
-    ``push`` and ``weight`` (4, H, W) are filled, and ``mean`` (3, H, W), the weighted mean of all views at the
-    disparity. Diagonals bound the quarters.
+    Where ``here`` is set, ``push`` and ``weight`` (4, H, W) are filled, and ``mean`` (3, H, W), the weighted mean of
+    all views at the disparity. Diagonals bound the quarters.
     """
     height, width = disparity.shape
     own = views.pixels[0]
     for y in range(first, last):
         for x in range(width):
-            push[:, y, x], weight[:, y, x] = 0.0, 0.0
-            for c in range(3):
-                mean[c, y, x] = own[c, y, x]
+            if here[y, x]:
+                push[:, y, x], weight[:, y, x] = 0.0, 0.0
+                for c in range(3):
+                    mean[c, y, x] = own[c, y, x]
         if y < 1 or y > height - 2:
             continue
         for x in range(1, width - 1):
+            if not here[y, x]:
+                continue
             gx0 = np.float32(0.5) * (smooth[0, y, x + 1] - smooth[0, y, x - 1])
             gx1 = np.float32(0.5) * (smooth[1, y, x + 1] - smooth[1, y, x - 1])
             gx2 = np.float32(0.5) * (smooth[2, y, x + 1] - smooth[2, y, x - 1])
@@ -226,15 +229,18 @@ def _sample(p, j, i, a0, a1, a2, a3, b0, b1, b2, b3):
 
 
 @lean_kernel
-def fit_planes(disparity, push, weight, view, radius, alike, near, prior, flat, out, sure, first, last):
+def fit_planes(disparity, push, weight, view, radius, alike, near, prior, flat, here, out, sure, first, last):
     """Fit a plane to the disparities d + push/weight around each pixel, weighted; its value at the pixel is ``out``.
 
     Neighbours up to ``radius`` pixels away weigh exp(−Σ_rgb |Δview|/alike − |Δd|/near). ``prior`` is the weight of
-    the old disparities, which keeps weak windows where they are. ``sure`` is the sum of weights.
+    the old disparities, which keeps weak windows where they are. ``sure`` is the sum of weights. Pixels outside
+    ``here`` stay.
     """
     height, width = disparity.shape
     for y in range(first, last):
         for x in range(width):
+            if not here[y, x]:
+                continue
             s0, sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             t0, tx, ty = 0.0, 0.0, 0.0
             d = disparity[y, x]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from .layers import FARTHEST, first_mm
 
 ndimage = Lazy("scipy.ndimage")
 Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
 Costs = NDArray[np.uint16]  # in 16-bit codes
 Progress = Callable[[int, int, str], Any]
 
@@ -38,7 +39,7 @@ MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of c
 SEARCH_SIDE, MANY, NOISE, VALLEY = 128, 16, 4.0, 2.0
 # Gauss–Newton: differences of occluded views, 8-bit codes; window of planes, px; likeness in codes and disparity;
 # weight of the old disparity, codes² a px²; weight of level planes over that of the data; longest step, px.
-STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 4, 6.0, 5, 15.0, 0.13, 1000.0, 1.0, 0.3
+STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 6, 6.0, 5, 15.0, 0.13, 1000.0, 1.0, 0.3
 # Two steps are enough where data in a window weigh more, codes² a px²; more of them move outlines by the colours that
 # pixels mix there. Median of lower rank at jumps of more than JUMP px: such pixels match the surface in front. On
 # `cuboid`, 16.7 to 16.0 % above 0.07 px (2026-11-25).
@@ -156,12 +157,14 @@ def estimate_depth(
         high = high if high > low else low + 1.0
     told(2, total, "costs")
     start, ratio, margin = matched(views, labels_between(views, low, high), workers)
-    disparity, noise = start, noise_codes(views)
-    mean = views.pixels[0].astype(np.float32)
+    disparity, noise, evidence = start, noise_codes(views), nothing_seen(views)
+    here = np.ones(start.shape, bool)
     for step in range(STEPS):
         told(3 + step, total, f"step {step + 1} over all views")
-        settled = SETTLED * CODES**2 if step > 1 else np.inf
-        disparity, mean, odds, halves = refined(views, disparity, noise, mean, settled, workers)
+        disparity, sure = refined(views, disparity, noise, evidence, here, workers)
+        if step > 0:
+            here &= sure <= SETTLED * CODES**2
+    odds, halves = at_odds(evidence, noise)
     disparity = thinned(disparity)
     told(3 + STEPS, total, "confidence")
     disparity[np.isnan(start)] = np.nan
@@ -299,28 +302,42 @@ def _logistic(weights: tuple[float, ...], terms: tuple[Map, ...]) -> Map:
     return np.asarray(1 / (1 + np.exp(-sum_)))
 
 
-def refined(
-    views: Views, disparity: Map, noise: float, mean: Map, settled: float, workers: int | None
-) -> tuple[Map, Map, Map, Map]:
-    """Return the disparity after a Gauss–Newton step over all views, their mean there, and the two of `at_odds`.
+class Evidence(NamedTuple):
+    """Sums of Gauss–Newton steps by quarters of the views, and what all views see."""
 
-    Gradients are of ``mean``, (3, H, W): those of one view have its noise, which makes steps too short. Where data
-    weigh more than ``settled`` the disparity stays.
+    push: Map  # (4, H, W)
+    weight: Map  # (4, H, W)
+    mean: Map  # (3, H, W), 16-bit codes
+
+
+def nothing_seen(views: Views) -> Evidence:
+    """Return the evidence before the first step: the mean is the reference."""
+    none = np.zeros((4, *views.pixels.shape[2:]), np.float32)
+    return Evidence(none, none.copy(), views.pixels[0].astype(np.float32))
+
+
+def refined(
+    views: Views, disparity: Map, noise: float, evidence: Evidence, here: Mask, workers: int | None
+) -> tuple[Map, Map]:
+    """Return the disparity after a Gauss–Newton step over all views where ``here`` is set, and its weight.
+
+    ``evidence`` is renewed there and in the windows around. Gradients are of its mean: those of one view have its
+    noise, which makes steps too short.
     """
-    height, width = disparity.shape
-    known = np.nan_to_num(disparity)
-    push, weight = (np.empty((4, height, width), np.float32) for _ in range(2))
-    seen = np.empty_like(mean)
-    run(workers, height, kernels.add_evidence, views, known, np.float32(OCCLUDED * CODES), mean, push, weight, seen)
-    odds, halves = at_odds(push, weight, noise)
-    out, sure = np.empty_like(known), np.empty_like(known)
+    height = here.shape[0]
+    known, seen = np.nan_to_num(disparity), evidence.mean.copy()
+    around = ndimage.maximum_filter(here, 2 * RADIUS + 1)
+    limit, (push, weight, mean) = np.float32(OCCLUDED * CODES), evidence
+    run(workers, height, kernels.add_evidence, views, known, limit, mean, around, push, weight, seen)
+    mean[:] = seen
+    odds, _ = at_odds(evidence, noise)
+    out, sure = known.copy(), np.zeros_like(known)
     view = views.pixels[0].astype(np.float32)
     likeness = np.float32(SAME_COLOUR * CODES), np.float32(SAME_SURFACE)
-    evidence = known, push.sum(axis=0), weight.sum(axis=0), view
-    run(workers, height, kernels.fit_planes, *evidence, RADIUS, *likeness, PRIOR * CODES**2, FLAT, out, sure)
+    sums = known, push.sum(axis=0), weight.sum(axis=0), view
+    run(workers, height, kernels.fit_planes, *sums, RADIUS, *likeness, PRIOR * CODES**2, FLAT, here, out, sure)
     out = known + np.clip(out - known, -LONGEST, LONGEST) / (1 + np.minimum(odds, 100) ** SUDDEN)
-    out = np.where(sure > settled, known, ndimage.median_filter(out, 3))
-    return out, seen, odds, halves
+    return np.where(here, ndimage.median_filter(out, 3), known), sure
 
 
 def thinned(disparity: Map) -> Map:
@@ -329,12 +346,12 @@ def thinned(disparity: Map) -> Map:
     return np.where(jump, ndimage.rank_filter(disparity, LOWER, 3), disparity)
 
 
-def at_odds(push: Map, weight: Map, noise: float) -> tuple[Map, Map]:
+def at_odds(evidence: Evidence, noise: float) -> tuple[Map, Map]:
     """Return by how much quarters of the views disagree over what is allowed, in windows of planes.
 
     The second is the most that two disjoint halves of the views differ, px.
     """
-    side = 2 * RADIUS + 1
+    side, (push, weight, _) = 2 * RADIUS + 1, evidence
     pushes, weights = (ndimage.uniform_filter(part, (0, side, side)) * side**2 for part in (push, weight))
     heavy = np.maximum(weights, 1)
     mass = heavy.sum(axis=0)
