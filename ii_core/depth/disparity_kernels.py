@@ -325,8 +325,8 @@ def move_to_view(disparity, down, across, filled, out):
 
 
 @lean_kernel
-def rivals(cost, total, apart, ratio, margin, first, last):
-    """Compare the label of least ``total`` with others at least ``apart`` labels away.
+def rivals(cost, total, labels, apart, ratio, margin, first, last):
+    """Compare the label of least ``total`` with others at least ``apart`` px away.
 
     ``ratio`` is its cost over the least cost of those, ``margin`` their least total above its own.
     """
@@ -338,7 +338,7 @@ def rivals(cost, total, apart, ratio, margin, first, last):
                     best = d
             other, least = np.float32(np.inf), np.float32(np.inf)
             for d in range(cost.shape[2]):
-                if abs(d - best) >= apart:
+                if abs(labels[d] - labels[best]) >= apart:
                     other = min(other, np.float32(cost[y, x, d]))
                     least = min(least, np.float32(total[y, x, d]))
             ratio[y, x] = np.float32(cost[y, x, best]) / other if 0.0 < other < np.inf else np.float32(1.0)

@@ -34,9 +34,9 @@ OTHER_SURFACE, SLOPE, LEAP, ALIKE = 30.0, 60.0, 30.0, 25.0
 FEW_RANGES = 3.0  # labels of all disparities over the most labels, up to which none are searched
 STEP = 0.48  # px that neighbouring labels are apart in the farthest view of a half-line
 MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of costs are then twice the field
-# The range of disparities: found in views of at most SEARCH_SIDE px, at MANY pixels whose costs within NOISE 8-bit
-# codes of the least span less than VALLEY px.
-SEARCH_SIDE, MANY, NOISE, VALLEY = 128, 16, 4.0, 2.0
+# The range of disparities: at most WIDEST of the longer side of a view; found in views of at most SEARCH_SIDE px, at
+# MANY pixels whose costs within NOISE 8-bit codes of the least span less than VALLEY px.
+WIDEST, SEARCH_SIDE, MANY, NOISE, VALLEY = 0.75, 128, 16, 4.0, 2.0
 # Gauss–Newton: differences of occluded views, 8-bit codes; window of planes, px; likeness in codes and disparity;
 # weight of the old disparity, codes² a px²; weight of level planes over that of the data; longest step, px.
 STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 6, 6.0, 5, 15.0, 0.13, 1000.0, 1.0, 0.3
@@ -183,29 +183,50 @@ def field_range(picture: IIPicture, *, workers: int | None = None) -> tuple[floa
 
 
 def labels_between(views: Views, low: float, high: float) -> Map:
-    """Return disparities to try, in equal steps: `STEP` px in the farthest view of a half-line, or wider."""
-    reach = np.abs(views.steps[views.lines >= 0]).max()
+    """Return disparities to try: `STEP` px in the farthest view of a half-line that sees the point, or wider."""
     most = max(FEWEST_LABELS, int(MOST_LABELS * len(views.steps)))
-    count = min(int(np.ceil((high - low) * reach / STEP)) + 1, most)
-    return np.linspace(low, high, max(count, 3), dtype=np.float32)
+    return spaced(views, low, high, most)
+
+
+def spaced(views: Views, low: float, high: float, most: int | None = None) -> Map:
+    """Return as many labels from low to high as `STEP` needs, at most that many."""
+    ends = reached(views, np.array([low, high]))
+    count = max(int(np.ceil(np.ptp(ends) / STEP)) + 1, 3)
+    places = np.linspace(*ends, count if most is None else min(count, max(most, 3)))
+    return reached(views, places, back=True).astype(np.float32)
+
+
+def reached(views: Views, values: NDArray[np.float64], *, back: bool = False) -> NDArray[np.float64]:
+    """Return the movement of disparities in the farthest view of a half-line that sees the point, px, or ``back``.
+
+    A point that moves by more than half a view is not counted as seen: the step between labels then grows with the
+    disparity, as that of depth does.
+    """
+    reach = float(np.abs(views.steps[views.lines >= 0]).max())
+    half, size = max(views.pixels.shape[2:]) / 2, np.abs(values)
+    with np.errstate(over="ignore"):
+        if back:
+            far = half / reach * np.exp(np.maximum(size / half - 1, 0))
+            return np.asarray(np.sign(values) * np.where(size < half, size / reach, far))
+        far = half * (1 + np.log(np.maximum(size * reach / half, 1)))
+    return np.asarray(np.sign(values) * np.where(size * reach < half, size * reach, far))
 
 
 def search_range(views: Views, camera: IICamera | None, workers: int | None) -> tuple[float, float]:
     """Return the lowest and the highest disparity of views, by matching small ones over all possible labels."""
-    low, high = possible(camera, max(views.pixels.shape[2:]) / 2)
-    reach = np.abs(views.steps[views.lines >= 0]).max()
-    if (high - low) * reach / STEP < FEW_RANGES * MOST_LABELS * len(views.steps):
+    low, high = possible(camera, max(views.pixels.shape[2:]) * WIDEST)
+    if spaced(views, low, high).size < FEW_RANGES * MOST_LABELS * len(views.steps):
         return low, high  # many small views: all disparities are tried
     scale = 1
     while max(views.pixels.shape[2:]) > SEARCH_SIDE:
         views, scale = halved(views), 2 * scale
-    labels = np.linspace(low / scale, high / scale, int((high - low) / scale * reach / STEP) + 3, dtype=np.float32)
+    labels = spaced(views, low / scale, high / scale)
     cost = costs(views, labels, workers)
     found = labelled(passed_on(views, cost, labels, workers), labels)
-    known = np.isfinite(found)
+    known, gaps, least = np.isfinite(found), np.gradient(labels), cost.argmin(axis=2)
     # a valley of the costs: where it is wide, noise decides
-    wide = (cost < cost.min(axis=2, keepdims=True) + NOISE * CODES).sum(axis=2) * (labels[1] - labels[0])
-    certain = known & (wide < VALLEY) & (np.abs(labels[cost.argmin(axis=2)] - found) < 0.2)
+    wide = (cost < cost.min(axis=2, keepdims=True) + NOISE * CODES) @ gaps
+    certain = known & (wide < VALLEY) & (np.abs(labels[least] - found) < np.maximum(0.2, gaps[least]))
     if certain.sum() < MANY:
         certain = known
     if not certain.any():
@@ -245,7 +266,8 @@ def passed_on(views: Views, cost: Costs, labels: Map, workers: int | None) -> Co
     height, width = views.pixels.shape[2:]
     view = views.pixels[0].transpose(1, 2, 0).astype(np.float32)
     total = np.zeros_like(cost)
-    prices = labels.astype(np.float64), SLOPE * CODES, LEAP * CODES, ALIKE * CODES
+    reach = float(np.abs(views.steps[views.lines >= 0]).max())
+    prices = reached(views, labels.astype(np.float64)) / reach, SLOPE * CODES, LEAP * CODES, ALIKE * CODES
     for columns, back in product((False, True), repeat=2):
         run(workers, width if columns else height, pass_on, cost, view, *prices, columns, back, total)
     return total
@@ -265,8 +287,7 @@ def matched(views: Views, labels: Map, workers: int | None) -> tuple[Map, Map, M
     cost = costs(views, labels, workers)
     total = passed_on(views, cost, labels, workers)
     ratio, margin = np.empty(cost.shape[:2], np.float32), np.empty(cost.shape[:2], np.float32)
-    apart = max(1, round(APART / float(labels[1] - labels[0])))
-    run(workers, height, kernels.rivals, cost, total, apart, ratio, margin)
+    run(workers, height, kernels.rivals, cost, total, labels, np.float32(APART), ratio, margin)
     del cost
     return np.asarray(ndimage.median_filter(labelled(total, labels), 3)), ratio, margin / CODES
 
