@@ -41,8 +41,9 @@ WIDEST, SEARCH_SIDE, MANY, NOISE, VALLEY = 0.75, 128, 16, 4.0, 2.0
 # weight of the old disparity, codes² a px²; weight of level planes over that of the data; longest step, px.
 STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 6, 6.0, 5, 15.0, 0.13, 1000.0, 1.0, 0.3
 # Two steps are enough where data in a window weigh more, codes² a px²; more of them move outlines by the colours that
-# pixels mix there. Where less, two, four, six and nine steps leave 72, 48, 38 and 35 % of *Apples* bad (2026-11-26). Median of lower rank at jumps of more than JUMP px: such pixels match the surface in front. On
-# `cuboid`, 16.7 to 16.0 % above 0.07 px (2026-11-25).
+# pixels mix there. Where data weigh less, two, four, six and nine steps leave 72, 48, 38 and 35 % of the pixels of
+# *Apples* bad (2026-11-26). Median of lower rank at jumps of more than JUMP px: such pixels match the surface in
+# front. On `cuboid`, 16.7 to 16.0 % above 0.07 px (2026-11-25).
 SETTLED, JUMP, LOWER = 1e5, 0.3, 3
 # Steps end where quarters of the views disagree by more than AT_ODDS px and BY_NOISE times what noise explains: by a
 # moving reflection, a hidden edge, or rendering noise that all views share. On antinous of the HCI fields 15.4 % are
