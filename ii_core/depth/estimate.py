@@ -49,11 +49,12 @@ SETTLED, JUMP, LOWER = 1e5, 0.3, 3
 # moving reflection, a hidden edge, or rendering noise that all views share. On antinous of the HCI fields 15.4 % are
 # above 0.07 px with this rule, more than 20 % without (2026-11-25).
 AT_ODDS, BY_NOISE, SUDDEN = 0.003, 4.0, 8
-# Confidence: labels so many px away are rivals. A pixel is right if the views agree and no rival does as well, the
-# product of two logistic terms: `JUDGES`. Few sure pixels among unsure ones are chance: a third term, `CROWD`, has
-# their mean over AROUND px. Fitted by `python -m benchmarks run depth_confidence` to 48 fields in closed form
-# (spheres, walls, bars, shadows, highlights), whose signs are kept, and to no other field (2026-11-26).
-APART, AROUND = 0.5, 31
+# Confidence: labels APART px away are rivals; labels of 9×9, 5×5 and 3×3 views are 0.12, 0.24 and 0.48 px apart, so
+# that 0.48 px counts in each. A pixel is right if the views agree and no rival does as well, the product of two
+# logistic terms: `JUDGES`. Few sure pixels among unsure ones are chance: a third term, `CROWD`, has their mean over
+# AROUND px. Fitted by `python -m benchmarks run depth_confidence` to 48 fields in closed form (spheres, walls, bars,
+# shadows, highlights), whose signs are kept, and to no other field (2026-11-26).
+APART, AROUND = 0.45, 31
 JUDGES = (0.49, -0.57, -0.94, -0.53), (-4.05, -0.36, -1.11, 1.09)
 CROWD = -2.19, 0.5, 4.61
 LOUD = 2 * OCCLUDED  # noise in codes from which no pixel is sure: all views then count as occluded
