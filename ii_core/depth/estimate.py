@@ -194,7 +194,7 @@ def spaced(views: Views, low: float, high: float, most: int | None = None) -> Ma
     """Return as many labels from low to high as `STEP` needs, at most that many."""
     ends = reached(views, np.array([low, high]))
     count = max(int(np.ceil(np.ptp(ends) / STEP)) + 1, 3)
-    places = np.linspace(*ends, count if most is None else min(count, max(most, 3)))
+    places = np.linspace(ends[0], ends[1], count if most is None else min(count, max(most, 3)))
     return reached(views, places, back=True).astype(np.float32)
 
 
