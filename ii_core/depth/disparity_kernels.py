@@ -35,7 +35,9 @@ def _cubic(f):
 def line_costs(views, labels, limit, lines, out, first, last):
     """out[y, x, d] = mean over the better half of the half-lines of views of the mean of min(Σ_rgb |Δ|, limit).
 
-    A point outside a view counts as `UNSEEN` of ``limit``: labels that few views see do not win by chance.
+    A point outside a view counts as `UNSEEN` of ``limit``: labels that few views see do not win by chance. ``lines``
+    is 8. Loops run over rows of pixels that start at index 0 and write one array: only those become vector
+    instructions.
     """
     width = out.shape[1]
     on = np.zeros(lines, np.float32)
@@ -43,8 +45,12 @@ def line_costs(views, labels, limit, lines, out, first, last):
         if views.lines[n] >= 0:
             on[views.lines[n]] += np.float32(1.0)
     total, count = np.empty((lines, width), np.float32), np.empty((lines, width), np.float32)
-    rows = np.empty((3, width), np.float32)
+    own, rows = np.empty((3, width), np.float32), np.empty((3, width + 3), np.float32)
+    half, cost = np.empty(width, np.float32), np.empty(width, np.float32)
     for y in range(first, last):
+        for c in range(3):
+            for x in range(width):
+                own[c, x] = views.pixels[0, c, y, x]
         for d in range(labels.size):
             total[:] = 0.0
             count[:] = 0.0
@@ -52,15 +58,16 @@ def line_costs(views, labels, limit, lines, out, first, last):
                 line = views.lines[n]
                 if line >= 0:
                     sy, sx = -labels[d] * views.steps[n, 0], -labels[d] * views.steps[n, 1]
-                    _add_differences(views.pixels, n, y, sy, sx, limit, rows, total[line], count[line])
+                    _add_differences(views.pixels[n], own, y, sy, sx, limit, rows, total[line], count[line])
+            _better_half(total, count, on, limit, half, cost)
             for x in range(width):
-                out[y, x, d] = np.uint16(_better_half(total, count, on, x, limit) + np.float32(0.5))
+                out[y, x, d] = np.uint16(cost[x] + np.float32(0.5))
 
 
 @stage_kernel
-def _add_differences(pixels, n, y, sy, sx, limit, rows, total, count):
-    """Add min(Σ_rgb |Δ|, limit) between row ``y`` of the reference and the view ``n``, moved by (sy, sx), cubic."""
-    height, width = pixels.shape[2:]
+def _add_differences(pixels, own, y, sy, sx, limit, rows, total, count):
+    """Add min(Σ_rgb |Δ|, limit) between a row of the reference and a view, moved by (sy, sx), cubic."""
+    height, width = pixels.shape[1:]
     top, left = math.floor(sy), math.floor(sx)
     if y + top < 0 or y + top + (sy > top) >= height:
         return
@@ -68,89 +75,112 @@ def _add_differences(pixels, n, y, sy, sx, limit, rows, total, count):
     start, stop = max(0, -left), min(width, width - left - (sx > left))
     if stop <= start:
         return
-    a0, a1, a2, a3 = _cubic(np.float32(sy - top))
-    b0, b1, b2, b3 = _cubic(np.float32(sx - left))
-    y0, y1 = max(y + top - 1, 0), y + top
-    y2, y3 = min(y + top + 1, height - 1), min(y + top + 2, height - 1)
     for c in range(3):
-        p = pixels[n, c]
-        if sy == top:  # half of the half-lines lie along rows
-            for x in range(width):
-                rows[c, x] = p[y1, x]
-            continue
-        for x in range(width):
-            rows[c, x] = (
-                a0 * np.float32(p[y0, x])
-                + a1 * np.float32(p[y1, x])
-                + a2 * np.float32(p[y2, x])
-                + a3 * np.float32(p[y3, x])
-            )
-    own = pixels[0]
-    inner, end = max(start, 1 - left), min(stop, width - 2 - left)
-    if sx == left:  # or along columns
-        for x in range(start, stop):
-            e = np.float32(0.0)
-            for c in range(3):
-                e += abs(rows[c, x + left] - np.float32(own[c, y, x]))
-            total[x] += min(e, limit)
-            count[x] += np.float32(1.0)
-        return
-    for x in range(inner, end):
-        i, e = x + left, np.float32(0.0)
-        for c in range(3):
-            r = rows[c]
-            e += abs(b0 * r[i - 1] + b1 * r[i] + b2 * r[i + 1] + b3 * r[i + 2] - np.float32(own[c, y, x]))
-        total[x] += min(e, limit)
-        count[x] += np.float32(1.0)
-    for x in range(start, stop):
-        if inner <= x < end:
-            continue
-        i, e = x + left, np.float32(0.0)
-        for c in range(3):
-            r = rows[c]
-            value = b0 * r[max(i - 1, 0)] + b1 * r[i] + b2 * r[min(i + 1, width - 1)] + b3 * r[min(i + 2, width - 1)]
-            e += abs(value - np.float32(own[c, y, x]))
-        total[x] += min(e, limit)
-        count[x] += np.float32(1.0)
+        _moved_row(pixels[c], y + top, np.float32(sy - top), rows[c])
+    b0, b1, b2, b3 = _cubic(np.float32(sx - left))
+    at, size = start + left, stop - start
+    p0, p1, p2, p3 = rows[0, at:], rows[0, at + 1 :], rows[0, at + 2 :], rows[0, at + 3 :]
+    q0, q1, q2, q3 = rows[1, at:], rows[1, at + 1 :], rows[1, at + 2 :], rows[1, at + 3 :]
+    r0, r1, r2, r3 = rows[2, at:], rows[2, at + 1 :], rows[2, at + 2 :], rows[2, at + 3 :]
+    o, p, q = own[0, start:], own[1, start:], own[2, start:]
+    sums, seen = total[start:], count[start:]
+    if sx == left:  # along columns
+        for x in range(size):
+            e = abs(p1[x] - o[x]) + abs(q1[x] - p[x]) + abs(r1[x] - q[x])
+            sums[x] += e if e < limit else limit
+    else:
+        for x in range(size):
+            e = abs(b0 * p0[x] + b1 * p1[x] + b2 * p2[x] + b3 * p3[x] - o[x])
+            e += abs(b0 * q0[x] + b1 * q1[x] + b2 * q2[x] + b3 * q3[x] - p[x])
+            e += abs(b0 * r0[x] + b1 * r1[x] + b2 * r2[x] + b3 * r3[x] - q[x])
+            sums[x] += e if e < limit else limit
+    for x in range(size):
+        seen[x] += np.float32(1.0)
 
 
 @stage_kernel
-def _better_half(total, count, on, x, limit):
-    """Return the mean of the lower half of the half-lines' means at pixel x; ``limit`` without one."""
-    seen = 0
-    for k in range(total.shape[0]):
-        if count[k, x] > 0.0:
-            value, j = (total[k, x] + (on[k] - count[k, x]) * limit * np.float32(UNSEEN)) / on[k], seen
-            while j > 0 and total[j - 1, x] > value:
-                total[j, x] = total[j - 1, x]
-                j -= 1
-            total[j, x] = value
-            seen += 1
-    half = (seen + 1) // 2
-    mean = np.float32(0.0)
-    for k in range(half):
-        mean += total[k, x]
-    return mean / half if half > 0 else limit
+def _moved_row(image, y, part, row):
+    """Interpolate a row of an image at y + part, continued by one pixel on the left and two on the right."""
+    height, width = image.shape
+    a0, a1, a2, a3 = _cubic(part)
+    i0, i1 = image[max(y - 1, 0)], image[y]
+    i2, i3 = image[min(y + 1, height - 1)], image[min(y + 2, height - 1)]
+    inner = row[1:]
+    if part == 0.0:  # half of the half-lines lie along rows
+        for x in range(width):
+            inner[x] = np.float32(i1[x])
+    else:
+        for x in range(width):
+            inner[x] = (
+                a0 * np.float32(i0[x]) + a1 * np.float32(i1[x]) + a2 * np.float32(i2[x]) + a3 * np.float32(i3[x])
+            )
+    row[0], row[width + 1], row[width + 2] = row[1], row[width], row[width]
+
+
+@stage_kernel
+def _better_half(total, count, on, limit, half, cost):
+    """``cost`` is the mean of the lower half of the half-lines' means; ``limit`` without one."""
+    half[:] = 0.0
+    for k in range(8):
+        sums, seen, unseen = total[k], count[k], limit * np.float32(UNSEEN)
+        for x in range(half.size):
+            mean = (sums[x] + (on[k] - seen[x]) * unseen) / on[k]
+            sums[x] = mean if seen[x] > 0.0 else np.float32(np.inf)
+        for x in range(half.size):
+            half[x] += np.float32(1.0) if seen[x] > 0.0 else np.float32(0.0)
+    for k in range(0, 8, 4):  # both fours in order
+        _in_order(total[k], total[k + 1])
+        _in_order(total[k + 2], total[k + 3])
+        _in_order(total[k], total[k + 2])
+        _in_order(total[k + 1], total[k + 3])
+        _in_order(total[k + 1], total[k + 2])
+    for k in range(4):  # the lower four of both
+        low, other = total[k], total[7 - k]
+        for x in range(half.size):
+            low[x] = other[x] if other[x] < low[x] else low[x]
+    _in_order(total[0], total[2])
+    _in_order(total[1], total[3])
+    _in_order(total[0], total[1])
+    _in_order(total[2], total[3])
+    cost[:] = 0.0
+    for k in range(4):
+        low = total[k]
+        for x in range(half.size):
+            cost[x] += low[x] if half[x] > np.float32(2 * k) else np.float32(0.0)
+    for x in range(half.size):
+        cost[x] = cost[x] / np.float32((int(half[x]) + 1) // 2) if half[x] > 0.0 else limit
+
+
+@stage_kernel
+def _in_order(low, high):
+    """Exchange the values of two rows where the first is larger."""
+    for x in range(low.size):
+        a, b = low[x], high[x]
+        low[x] = b if b < a else a
+        high[x] = a if b < a else b
 
 
 @lean_kernel
-def add_evidence(views, disparity, limit, smooth, push, weight, mean, first, last):
+def add_evidence(views, disparity, limit, smooth, here, push, weight, mean, first, last):
     """Add up a Gauss–Newton step by quarters of views: d + Σpush/Σweight is a pixel's least-squares disparity.
 
     A view's weight is 1/(1 + r²/limit²)², r² its squared difference, ``smooth`` (3, H, W) the image of the gradients.
-    ``push`` and ``weight`` (4, H, W) are filled, and ``mean`` (3, H, W), the weighted mean of all views at the
-    disparity. Diagonals bound the quarters.
+    Where ``here`` is set, ``push`` and ``weight`` (4, H, W) are filled, and ``mean`` (3, H, W), the weighted mean of
+    all views at the disparity. Diagonals bound the quarters.
     """
     height, width = disparity.shape
     own = views.pixels[0]
     for y in range(first, last):
         for x in range(width):
-            push[:, y, x], weight[:, y, x] = 0.0, 0.0
-            for c in range(3):
-                mean[c, y, x] = own[c, y, x]
+            if here[y, x]:
+                push[:, y, x], weight[:, y, x] = 0.0, 0.0
+                for c in range(3):
+                    mean[c, y, x] = own[c, y, x]
         if y < 1 or y > height - 2:
             continue
         for x in range(1, width - 1):
+            if not here[y, x]:
+                continue
             gx0 = np.float32(0.5) * (smooth[0, y, x + 1] - smooth[0, y, x - 1])
             gx1 = np.float32(0.5) * (smooth[1, y, x + 1] - smooth[1, y, x - 1])
             gx2 = np.float32(0.5) * (smooth[2, y, x + 1] - smooth[2, y, x - 1])
@@ -199,15 +229,18 @@ def _sample(p, j, i, a0, a1, a2, a3, b0, b1, b2, b3):
 
 
 @lean_kernel
-def fit_planes(disparity, push, weight, view, radius, alike, near, prior, flat, out, sure, first, last):
+def fit_planes(disparity, push, weight, view, radius, alike, near, prior, flat, here, out, sure, first, last):
     """Fit a plane to the disparities d + push/weight around each pixel, weighted; its value at the pixel is ``out``.
 
     Neighbours up to ``radius`` pixels away weigh exp(−Σ_rgb |Δview|/alike − |Δd|/near). ``prior`` is the weight of
-    the old disparities, which keeps weak windows where they are. ``sure`` is the sum of weights.
+    the old disparities, which keeps weak windows where they are. ``sure`` is the sum of weights. Pixels outside
+    ``here`` stay.
     """
     height, width = disparity.shape
     for y in range(first, last):
         for x in range(width):
+            if not here[y, x]:
+                continue
             s0, sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             t0, tx, ty = 0.0, 0.0, 0.0
             d = disparity[y, x]
@@ -292,8 +325,8 @@ def move_to_view(disparity, down, across, filled, out):
 
 
 @lean_kernel
-def rivals(cost, total, apart, ratio, margin, first, last):
-    """Compare the label of least ``total`` with others at least ``apart`` labels away.
+def rivals(cost, total, labels, apart, ratio, margin, first, last):
+    """Compare the label of least ``total`` with others at least ``apart`` px away.
 
     ``ratio`` is its cost over the least cost of those, ``margin`` their least total above its own.
     """
@@ -305,7 +338,7 @@ def rivals(cost, total, apart, ratio, margin, first, last):
                     best = d
             other, least = np.float32(np.inf), np.float32(np.inf)
             for d in range(cost.shape[2]):
-                if abs(d - best) >= apart:
+                if abs(labels[d] - labels[best]) >= apart:
                     other = min(other, np.float32(cost[y, x, d]))
                     least = min(least, np.float32(total[y, x, d]))
             ratio[y, x] = np.float32(cost[y, x, best]) / other if 0.0 < other < np.inf else np.float32(1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from .layers import FARTHEST, first_mm
 
 ndimage = Lazy("scipy.ndimage")
 Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
 Costs = NDArray[np.uint16]  # in 16-bit codes
 Progress = Callable[[int, int, str], Any]
 
@@ -33,25 +34,27 @@ OTHER_SURFACE, SLOPE, LEAP, ALIKE = 30.0, 60.0, 30.0, 25.0
 FEW_RANGES = 3.0  # labels of all disparities over the most labels, up to which none are searched
 STEP = 0.48  # px that neighbouring labels are apart in the farthest view of a half-line
 MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of costs are then twice the field
-# The range of disparities: found in views of at most SEARCH_SIDE px, at MANY pixels whose costs within NOISE 8-bit
-# codes of the least span less than VALLEY px.
-SEARCH_SIDE, MANY, NOISE, VALLEY = 128, 16, 4.0, 2.0
+# The range of disparities: at most WIDEST of the longer side of a view; found in views of at most SEARCH_SIDE px, at
+# MANY pixels whose costs within NOISE 8-bit codes of the least span less than VALLEY px.
+WIDEST, SEARCH_SIDE, MANY, NOISE, VALLEY = 0.75, 128, 16, 4.0, 2.0
 # Gauss–Newton: differences of occluded views, 8-bit codes; window of planes, px; likeness in codes and disparity;
 # weight of the old disparity, codes² a px²; weight of level planes over that of the data; longest step, px.
-STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 4, 6.0, 5, 15.0, 0.13, 1000.0, 1.0, 0.3
+STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 6, 6.0, 5, 15.0, 0.13, 1000.0, 1.0, 0.3
 # Two steps are enough where data in a window weigh more, codes² a px²; more of them move outlines by the colours that
-# pixels mix there. Median of lower rank at jumps of more than JUMP px: such pixels match the surface in front. On
-# `cuboid`, 16.7 to 16.0 % above 0.07 px (2026-11-25).
+# pixels mix there. Where data weigh less, two, four, six and nine steps leave 72, 48, 38 and 35 % of the pixels of
+# *Apples* bad (2026-11-26). Median of lower rank at jumps of more than JUMP px: such pixels match the surface in
+# front. On `cuboid`, 16.7 to 16.0 % above 0.07 px (2026-11-25).
 SETTLED, JUMP, LOWER = 1e5, 0.3, 3
 # Steps end where quarters of the views disagree by more than AT_ODDS px and BY_NOISE times what noise explains: by a
 # moving reflection, a hidden edge, or rendering noise that all views share. On antinous of the HCI fields 15.4 % are
 # above 0.07 px with this rule, more than 20 % without (2026-11-25).
 AT_ODDS, BY_NOISE, SUDDEN = 0.003, 4.0, 8
-# Confidence: labels so many px away are rivals. A pixel is right if the views agree and no rival does as well, the
-# product of two logistic terms: `JUDGES`. Few sure pixels among unsure ones are chance: a third term, `CROWD`, has
-# their mean over AROUND px. Fitted by `python -m benchmarks run depth_confidence` to 48 fields in closed form
-# (spheres, walls, bars, shadows, highlights), whose signs are kept, and to no other field (2026-11-26).
-APART, AROUND = 0.5, 31
+# Confidence: labels APART px away are rivals; labels of 9×9, 5×5 and 3×3 views are 0.12, 0.24 and 0.48 px apart, so
+# that 0.48 px counts in each. A pixel is right if the views agree and no rival does as well, the product of two
+# logistic terms: `JUDGES`. Few sure pixels among unsure ones are chance: a third term, `CROWD`, has their mean over
+# AROUND px. Fitted by `python -m benchmarks run depth_confidence` to 48 fields in closed form (spheres, walls, bars,
+# shadows, highlights), whose signs are kept, and to no other field (2026-11-26).
+APART, AROUND = 0.45, 31
 JUDGES = (0.49, -0.57, -0.94, -0.53), (-4.05, -0.36, -1.11, 1.09)
 CROWD = -2.19, 0.5, 4.61
 LOUD = 2 * OCCLUDED  # noise in codes from which no pixel is sure: all views then count as occluded
@@ -156,12 +159,14 @@ def estimate_depth(
         high = high if high > low else low + 1.0
     told(2, total, "costs")
     start, ratio, margin = matched(views, labels_between(views, low, high), workers)
-    disparity, noise = start, noise_codes(views)
-    mean = views.pixels[0].astype(np.float32)
+    disparity, noise, evidence = start, noise_codes(views), nothing_seen(views)
+    here = np.ones(start.shape, bool)
     for step in range(STEPS):
         told(3 + step, total, f"step {step + 1} over all views")
-        settled = SETTLED * CODES**2 if step > 1 else np.inf
-        disparity, mean, odds, halves = refined(views, disparity, noise, mean, settled, workers)
+        disparity, sure = refined(views, disparity, noise, evidence, here, workers)
+        if step > 0:
+            here &= sure <= SETTLED * CODES**2
+    odds, halves = at_odds(evidence, noise)
     disparity = thinned(disparity)
     told(3 + STEPS, total, "confidence")
     disparity[np.isnan(start)] = np.nan
@@ -180,29 +185,50 @@ def field_range(picture: IIPicture, *, workers: int | None = None) -> tuple[floa
 
 
 def labels_between(views: Views, low: float, high: float) -> Map:
-    """Return disparities to try, in equal steps: `STEP` px in the farthest view of a half-line, or wider."""
-    reach = np.abs(views.steps[views.lines >= 0]).max()
+    """Return disparities to try: `STEP` px in the farthest view of a half-line that sees the point, or wider."""
     most = max(FEWEST_LABELS, int(MOST_LABELS * len(views.steps)))
-    count = min(int(np.ceil((high - low) * reach / STEP)) + 1, most)
-    return np.linspace(low, high, max(count, 3), dtype=np.float32)
+    return spaced(views, low, high, most)
+
+
+def spaced(views: Views, low: float, high: float, most: int | None = None) -> Map:
+    """Return as many labels from low to high as `STEP` needs, at most that many."""
+    ends = reached(views, np.array([low, high]))
+    count = max(int(np.ceil(np.ptp(ends) / STEP)) + 1, 3)
+    places = np.linspace(ends[0], ends[1], count if most is None else min(count, max(most, 3)))
+    return reached(views, places, back=True).astype(np.float32)
+
+
+def reached(views: Views, values: NDArray[np.float64], *, back: bool = False) -> NDArray[np.float64]:
+    """Return the movement of disparities in the farthest view of a half-line that sees the point, px, or ``back``.
+
+    A point that moves by more than half a view is not counted as seen: the step between labels then grows with the
+    disparity, as that of depth does.
+    """
+    reach = float(np.abs(views.steps[views.lines >= 0]).max())
+    half, size = max(views.pixels.shape[2:]) / 2, np.abs(values)
+    with np.errstate(over="ignore"):
+        if back:
+            far = half / reach * np.exp(np.maximum(size / half - 1, 0))
+            return np.asarray(np.sign(values) * np.where(size < half, size / reach, far))
+        far = half * (1 + np.log(np.maximum(size * reach / half, 1)))
+    return np.asarray(np.sign(values) * np.where(size * reach < half, size * reach, far))
 
 
 def search_range(views: Views, camera: IICamera | None, workers: int | None) -> tuple[float, float]:
     """Return the lowest and the highest disparity of views, by matching small ones over all possible labels."""
-    low, high = possible(camera, max(views.pixels.shape[2:]) / 2)
-    reach = np.abs(views.steps[views.lines >= 0]).max()
-    if (high - low) * reach / STEP < FEW_RANGES * MOST_LABELS * len(views.steps):
+    low, high = possible(camera, max(views.pixels.shape[2:]) * WIDEST)
+    if spaced(views, low, high).size < FEW_RANGES * MOST_LABELS * len(views.steps):
         return low, high  # many small views: all disparities are tried
     scale = 1
     while max(views.pixels.shape[2:]) > SEARCH_SIDE:
         views, scale = halved(views), 2 * scale
-    labels = np.linspace(low / scale, high / scale, int((high - low) / scale * reach / STEP) + 3, dtype=np.float32)
+    labels = spaced(views, low / scale, high / scale)
     cost = costs(views, labels, workers)
     found = labelled(passed_on(views, cost, labels, workers), labels)
-    known = np.isfinite(found)
+    known, gaps, least = np.isfinite(found), np.gradient(labels), cost.argmin(axis=2)
     # a valley of the costs: where it is wide, noise decides
-    wide = (cost < cost.min(axis=2, keepdims=True) + NOISE * CODES).sum(axis=2) * (labels[1] - labels[0])
-    certain = known & (wide < VALLEY) & (np.abs(labels[cost.argmin(axis=2)] - found) < 0.2)
+    wide = (cost < cost.min(axis=2, keepdims=True) + NOISE * CODES) @ gaps
+    certain = known & (wide < VALLEY) & (np.abs(labels[least] - found) < np.maximum(0.2, gaps[least]))
     if certain.sum() < MANY:
         certain = known
     if not certain.any():
@@ -242,7 +268,8 @@ def passed_on(views: Views, cost: Costs, labels: Map, workers: int | None) -> Co
     height, width = views.pixels.shape[2:]
     view = views.pixels[0].transpose(1, 2, 0).astype(np.float32)
     total = np.zeros_like(cost)
-    prices = labels.astype(np.float64), SLOPE * CODES, LEAP * CODES, ALIKE * CODES
+    reach = float(np.abs(views.steps[views.lines >= 0]).max())
+    prices = reached(views, labels.astype(np.float64)) / reach, SLOPE * CODES, LEAP * CODES, ALIKE * CODES
     for columns, back in product((False, True), repeat=2):
         run(workers, width if columns else height, pass_on, cost, view, *prices, columns, back, total)
     return total
@@ -262,8 +289,7 @@ def matched(views: Views, labels: Map, workers: int | None) -> tuple[Map, Map, M
     cost = costs(views, labels, workers)
     total = passed_on(views, cost, labels, workers)
     ratio, margin = np.empty(cost.shape[:2], np.float32), np.empty(cost.shape[:2], np.float32)
-    apart = max(1, round(APART / float(labels[1] - labels[0])))
-    run(workers, height, kernels.rivals, cost, total, apart, ratio, margin)
+    run(workers, height, kernels.rivals, cost, total, labels, np.float32(APART), ratio, margin)
     del cost
     return np.asarray(ndimage.median_filter(labelled(total, labels), 3)), ratio, margin / CODES
 
@@ -299,28 +325,42 @@ def _logistic(weights: tuple[float, ...], terms: tuple[Map, ...]) -> Map:
     return np.asarray(1 / (1 + np.exp(-sum_)))
 
 
-def refined(
-    views: Views, disparity: Map, noise: float, mean: Map, settled: float, workers: int | None
-) -> tuple[Map, Map, Map, Map]:
-    """Return the disparity after a Gauss–Newton step over all views, their mean there, and the two of `at_odds`.
+class Evidence(NamedTuple):
+    """Sums of Gauss–Newton steps by quarters of the views, and what all views see."""
 
-    Gradients are of ``mean``, (3, H, W): those of one view have its noise, which makes steps too short. Where data
-    weigh more than ``settled`` the disparity stays.
+    push: Map  # (4, H, W)
+    weight: Map  # (4, H, W)
+    mean: Map  # (3, H, W), 16-bit codes
+
+
+def nothing_seen(views: Views) -> Evidence:
+    """Return the evidence before the first step: the mean is the reference."""
+    none = np.zeros((4, *views.pixels.shape[2:]), np.float32)
+    return Evidence(none, none.copy(), views.pixels[0].astype(np.float32))
+
+
+def refined(
+    views: Views, disparity: Map, noise: float, evidence: Evidence, here: Mask, workers: int | None
+) -> tuple[Map, Map]:
+    """Return the disparity after a Gauss–Newton step over all views where ``here`` is set, and its weight.
+
+    ``evidence`` is renewed there and in the windows around. Gradients are of its mean: those of one view have its
+    noise, which makes steps too short.
     """
-    height, width = disparity.shape
-    known = np.nan_to_num(disparity)
-    push, weight = (np.empty((4, height, width), np.float32) for _ in range(2))
-    seen = np.empty_like(mean)
-    run(workers, height, kernels.add_evidence, views, known, np.float32(OCCLUDED * CODES), mean, push, weight, seen)
-    odds, halves = at_odds(push, weight, noise)
-    out, sure = np.empty_like(known), np.empty_like(known)
+    height = here.shape[0]
+    known, seen = np.nan_to_num(disparity), evidence.mean.copy()
+    around = ndimage.maximum_filter(here, 2 * RADIUS + 1)
+    limit, (push, weight, mean) = np.float32(OCCLUDED * CODES), evidence
+    run(workers, height, kernels.add_evidence, views, known, limit, mean, around, push, weight, seen)
+    mean[:] = seen
+    odds, _ = at_odds(evidence, noise)
+    out, sure = known.copy(), np.zeros_like(known)
     view = views.pixels[0].astype(np.float32)
     likeness = np.float32(SAME_COLOUR * CODES), np.float32(SAME_SURFACE)
-    evidence = known, push.sum(axis=0), weight.sum(axis=0), view
-    run(workers, height, kernels.fit_planes, *evidence, RADIUS, *likeness, PRIOR * CODES**2, FLAT, out, sure)
+    sums = known, push.sum(axis=0), weight.sum(axis=0), view
+    run(workers, height, kernels.fit_planes, *sums, RADIUS, *likeness, PRIOR * CODES**2, FLAT, here, out, sure)
     out = known + np.clip(out - known, -LONGEST, LONGEST) / (1 + np.minimum(odds, 100) ** SUDDEN)
-    out = np.where(sure > settled, known, ndimage.median_filter(out, 3))
-    return out, seen, odds, halves
+    return np.where(here, ndimage.median_filter(out, 3), known), sure
 
 
 def thinned(disparity: Map) -> Map:
@@ -329,12 +369,12 @@ def thinned(disparity: Map) -> Map:
     return np.where(jump, ndimage.rank_filter(disparity, LOWER, 3), disparity)
 
 
-def at_odds(push: Map, weight: Map, noise: float) -> tuple[Map, Map]:
+def at_odds(evidence: Evidence, noise: float) -> tuple[Map, Map]:
     """Return by how much quarters of the views disagree over what is allowed, in windows of planes.
 
     The second is the most that two disjoint halves of the views differ, px.
     """
-    side = 2 * RADIUS + 1
+    side, (push, weight, _) = 2 * RADIUS + 1, evidence
     pushes, weights = (ndimage.uniform_filter(part, (0, side, side)) * side**2 for part in (push, weight))
     heavy = np.maximum(weights, 1)
     mass = heavy.sum(axis=0)

@@ -6,7 +6,19 @@ import pytest
 from ii_core import IICamera, IIPicture, depth_of_disparity, estimate_depth
 from ii_core.depth.all_views import disparity_of_views
 from ii_core.depth.around import half_lines, views_around
-from ii_core.depth.estimate import CODES, OTHER_SURFACE, costs, field_range, labels_between, passed_on
+from ii_core.depth.estimate import (
+    CODES,
+    OTHER_SURFACE,
+    STEP,
+    costs,
+    field_range,
+    labels_between,
+    nothing_seen,
+    passed_on,
+    reached,
+    refined,
+    spaced,
+)
 from ii_core.depth.points import view_points
 from ii_core.picture.assumed import with_assumed_camera
 
@@ -114,6 +126,29 @@ def test_half_lines_take_near_and_far_views():
     picture, _ = slanted()
     labels = labels_between(views_around(picture, (2, 2)), -1.0, 1.0)
     assert labels[0] == -1 and labels[-1] == 1 and np.ptp(np.diff(labels)) < 1e-6
+
+
+def test_labels_are_a_step_apart_in_the_farthest_view_that_sees_the_point():
+    """From 8 px on, a point leaves half a view of 128 px within fewer than the 8 steps of the farthest view."""
+    views = views_around(IIPicture(np.zeros((64 * 16, 128 * 16, 3), np.uint8), (128, 64), (16, 16)), (8, 8))
+    labels = spaced(views, -90.0, 40.0).astype(float)
+    assert labels[0] == -90 and abs(labels[-1] - 40) < 1e-4
+    middle, gaps = (labels[1:] + labels[:-1]) / 2, np.diff(labels)
+    np.testing.assert_allclose(gaps * np.minimum(8, 64 / np.abs(middle)), STEP, rtol=0.02)
+    np.testing.assert_allclose(reached(views, reached(views, labels), back=True), labels)
+
+
+def test_a_step_moves_the_pixels_named_and_no_others():
+    """On a plane of disparity 0.7 from 0.6: a step goes to the truth where it is taken."""
+    picture, truth = slanted(slope=0.0)
+    views = views_around(picture, (2, 2))
+    here = np.zeros(truth.shape, bool)
+    here[:, :24] = True
+    start, evidence = np.full(truth.shape, 0.6, np.float32), nothing_seen(views)
+    found, sure = refined(views, start, 0.3, evidence, here, 1)
+    np.testing.assert_array_equal(found[:, 24:], np.float32(0.6))
+    assert not sure[:, 24:].any() and sure[8:-8, 8:20].min() > 0
+    assert np.abs(found - truth)[8:-8, 8:20].max() < 0.01
 
 
 def test_views_moved_by_disparity_keep_the_nearest():
