@@ -36,6 +36,7 @@ FIELDS = ("key", *STAMP, "seconds", "result")
 # Packages that determine every number, besides the modules of the benchmark itself; pages and charts are excluded.
 PACKAGES = ("ii_core", "raytrace_ii", "codec", "metrics", "assets")
 SOURCES = (".py", ".toml", ".json", ".png", ".jpg")
+NAMED = 6  # commits that a page names one by one
 CHANGED, MISSING, ALL = AGAIN = ("changed", "missing", "all")
 
 
@@ -194,9 +195,12 @@ def commit_of(record: Mapping[str, Any]) -> str:
 
 
 def origin(rows: Iterable[Mapping[str, Any]]) -> str:
-    """Return a sentence with the commits that measured these rows."""
+    """Return a sentence with the commits that measured these rows; of many, the first and how many there are."""
     commits = list(dict.fromkeys(row["commit"] for row in rows))
-    known = ", ".join(f"`{commit}`" for commit in commits if commit != "unsure")
+    named = [f"`{commit}`" for commit in commits if commit != "unsure"]
+    known = ", ".join(named)
+    if len(named) > NAMED:
+        known = f"{named[0]} and {len(named) - 1} other commits, which the records in `benchmarks/results` name"
     if "unsure" not in commits:
         return f"Measured by {known}."
     if not known:

@@ -195,6 +195,8 @@ def test_tables_have_a_column_of_commits_if_they_differ():
     assert "`abc`; the commits that measured the rows without one are unknown" in origin(
         [{"commit": "abc"}, {"commit": "unsure"}]
     )
+    many = origin([{"commit": f"a{i}"} for i in range(9)])
+    assert many == "Measured by `a0` and 8 other commits, which the records in `benchmarks/results` name."
     assert commit_of({"git": {"commit": "0123456789", "dirty": True}}) == "0123456+"
 
 
