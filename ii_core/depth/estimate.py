@@ -30,7 +30,7 @@ Costs = NDArray[np.uint16]  # in 16-bit codes
 Progress = Callable[[int, int, str], Any]
 
 # In 8-bit codes summed over R, G and B: the difference of another surface; prices of `pass_on`.
-OTHER_SURFACE, SLOPE, LEAP, ALIKE = 30.0, 60.0, 30.0, 25.0
+OTHER_SURFACE, SLOPE, LEAP, ALIKE = 30.0, 240.0, 33.0, 90.0
 FEW_RANGES = 3.0  # labels of all disparities over the most labels, up to which none are searched
 STEP = 0.48  # px that neighbouring labels are apart in the farthest view of a half-line
 MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of costs are then twice the field
@@ -39,7 +39,9 @@ MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of c
 WIDEST, SEARCH_SIDE, MANY, NOISE, VALLEY = 0.75, 128, 16, 4.0, 2.0
 # Gauss–Newton: differences of occluded views, 8-bit codes; window of planes, px; likeness in codes and disparity;
 # weight of the old disparity, codes² a px²; weight of level planes over that of the data; longest step, px.
-STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 6, 6.0, 5, 15.0, 0.13, 1000.0, 1.0, 0.3
+STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 6, 6.0, 5, 20.0, 0.1, 1000.0, 0.2, 0.3
+# Data of pixels BEHIND px behind a neighbour count FRINGE: an outline in front moves over them.
+BEHIND, FRINGE = 0.25, np.float32(0.05)
 # Two steps are enough where data in a window weigh more, codes² a px²; more of them move outlines by the colours that
 # pixels mix there. Where data weigh less, two, four, six and nine steps leave 72, 48, 38 and 35 % of the pixels of
 # *Apples* bad (2026-11-26). Median of lower rank at jumps of more than JUMP px: such pixels match the surface in
@@ -357,7 +359,8 @@ def refined(
     out, sure = known.copy(), np.zeros_like(known)
     view = views.pixels[0].astype(np.float32)
     likeness = np.float32(SAME_COLOUR * CODES), np.float32(SAME_SURFACE)
-    sums = known, push.sum(axis=0), weight.sum(axis=0), view
+    counted = np.where(ndimage.maximum_filter(known, 3) - known > BEHIND, FRINGE, np.float32(1))
+    sums = known, push.sum(axis=0) * counted, weight.sum(axis=0) * counted, view
     run(workers, height, kernels.fit_planes, *sums, RADIUS, *likeness, PRIOR * CODES**2, FLAT, here, out, sure)
     out = known + np.clip(out - known, -LONGEST, LONGEST) / (1 + np.minimum(odds, 100) ** SUDDEN)
     return np.where(here, ndimage.median_filter(out, 3), known), sure
