@@ -111,9 +111,10 @@ def errors(disparity: np.ndarray, true: np.ndarray, sure: np.ndarray | None = No
     error = np.where(np.isfinite(disparity), np.abs(disparity - true), np.inf)[inner]
     out = {"bad_007": float((error > 0.07).mean()), "bad_02": float((error > 0.2).mean())}
     if sure is not None:
-        held = sure[inner]
-        out |= {"sure": float(held.mean()), "bad_where_sure": float((error > 0.07)[held].mean()),
-                "bad_02_where_sure": float((error > 0.2)[held].mean())}  # fmt: skip
+        held = error[sure[inner]]
+        out["sure"] = held.size / error.size
+        shares = {"bad_where_sure": 0.07, "bad_02_where_sure": 0.2}
+        out |= {name: float((held > most).mean()) if held.size else None for name, most in shares.items()}
     return {**out, "median": float(np.median(error))}
 
 
@@ -227,7 +228,9 @@ def tables() -> Tables:
     theirs = [
         [
             r["field"], r["views"], f"{100 * r['bad_007']:.1f}", f"{100 * r['bad_02']:.1f}", f"{r['median']:.3f}",
-            f"{100 * r['sure']:.0f}", f"{100 * r['bad_where_sure']:.1f}", f"{100 * r['bad_02_where_sure']:.1f}",
+            f"{100 * r['sure']:.0f}",
+            # records before 2026-11-27 hold NaN where no pixel is sure
+            *(f"{100 * r[n]:.1f}" if r["sure"] > 0 else "–" for n in ("bad_where_sure", "bad_02_where_sure")),
             f"{r['cpu']:.0f}",
         ]
         for r in rows if r["study"] == "published"
