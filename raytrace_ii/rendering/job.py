@@ -194,9 +194,7 @@ class Job:
         arrays = {"pixels": encoded(radiance, order.pixels, divisor, self.dtype).reshape(*shape, 3)}
         for name in self.support:
             values: NDArray[Any] = samples if name == "samples" else found["depth" if name == "disparity" else name]
-            image = np.empty_like(values)
-            image[order.pixels] = values
-            image = image.reshape(*shape, *values.shape[1:])
+            image = order.in_place(values).reshape(*shape, *values.shape[1:])
             arrays[name] = disparity(self.camera, image) if name == "disparity" else image
         return Block(rows, cols, arrays, tracer.count, histogram)
 
@@ -336,7 +334,7 @@ class Job:
                 across, down = (places[plane] for places in self._views.planes)
                 start = even.moved(rows, cols, across, down)._replace(rows=order.rows, columns=order.columns)
             assert start is not None
-            some = faces[rows.start - top : rows.stop - top, cols].reshape(-1)[order.pixels]
+            some = faces[rows.start - top : rows.stop - top, cols].reshape(-1).take(order.pixels, mode="clip")
             seen = support if plane == 0 else None
             tracer.run(start, radiance, seen, self._keys(m, n, plane, 1), faces=some)
         return radiance

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +28,16 @@ Integers = NDArray[np.int64]
 
 
 class Order(NamedTuple):
-    """Pixels of a tile in the order of their rays: C-order number, row and column."""
+    """Pixels of a tile in the order of their rays: C-order number, row and column; and the ray of each pixel."""
 
     pixels: NDArray[np.int32]
     rows: NDArray[np.int32]
     columns: NDArray[np.int32]
+    rays: NDArray[np.int32]
+
+    def in_place(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return values (n, ...) of rays in the order of the pixels: a take is 4 × as fast as writing by index."""
+        return np.take(values, self.rays, axis=0, mode="clip")
 
 
 def tiles(camera: Camera, rays: int, block: Tile | None = None, *, whole_lenses: bool = False) -> Iterator[Tile]:
@@ -137,8 +142,10 @@ def _morton(points: NDArray[np.float64], bits: int) -> Integers:
 
 def _order(keys: Integers, width: int) -> Order:
     pixels = np.argsort(keys, axis=None, kind="stable")
+    rays = np.empty_like(pixels)
+    rays[pixels] = np.arange(len(pixels))
     # not made read-only: kernels would be compiled once more for such arrays
-    return Order(*(part.astype(np.int32) for part in (pixels, pixels // width, pixels % width)))
+    return Order(*(part.astype(np.int32) for part in (pixels, pixels // width, pixels % width, rays)))
 
 
 def _lattice(camera: Camera) -> Lattice | None:

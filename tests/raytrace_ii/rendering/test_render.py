@@ -382,7 +382,8 @@ def test_every_pixel_of_a_tile_is_traced_once(camera):
             order = ray_order(camera, rows, cols)
             shape = rows.stop - rows.start, cols.stop - cols.start
             np.testing.assert_array_equal(np.sort(order.pixels), np.arange(np.prod(shape)))
-            np.testing.assert_array_equal(np.ravel_multi_index(order[1:], shape), order.pixels)
+            np.testing.assert_array_equal(np.ravel_multi_index((order.rows, order.columns), shape), order.pixels)
+            np.testing.assert_array_equal(order.in_place(order.pixels), np.arange(np.prod(shape)))
 
 
 @pytest.mark.parametrize("camera", [REGULAR, LINES])
