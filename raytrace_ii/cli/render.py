@@ -325,18 +325,15 @@ def _all_support(array: Any) -> list[str]:
 
 
 def _samples(samples: str, error: float | None) -> dict[str, Any]:
-    """Return the number of samples, their range or edges, and the target error of the latter two."""
+    """Return the number of samples, their range or edges, and the target error, of those that are given."""
     target = {} if error is None else {"error": error}
-    samples = samples or ("1" if error is None else "edges")
-    if samples == "edges":
-        return {"samples": samples, **target}
+    if samples in ("", "edges"):
+        return {"samples": samples or None, **target}
     least, dots, most = samples.partition("..")
     try:
         numbers = (int(least), int(most)) if dots else int(least)
     except ValueError:
         raise ValueError(f"samples is {samples!r}: a whole number, two like 4..64, or edges is needed") from None
-    if error is not None and not dots:
-        raise ValueError(f"error is {error:g}, but the number of samples is fixed: a range like 4..64 is needed")
     return {"samples": numbers, **target}
 
 

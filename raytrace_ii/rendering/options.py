@@ -23,8 +23,8 @@ MOST_NOISE = 1e6  # 8-bit steps, of which white has 255
 class SetKeywords(TypedDict, total=False):
     """Keywords of `render_set` for the fields of `RenderOptions`; a set has poses and bits of its own."""
 
-    samples: int | tuple[int, int] | str
-    error: float
+    samples: int | tuple[int, int] | str | None
+    error: float | None
     seed: int
     noise: float
     texture_filter: bool
@@ -46,17 +46,18 @@ class RenderOptions:
 
     Parameters
     ----------
-    samples : int, (least, most) or "edges"
-        Rays per pixel. One ray starts at the pixel's centre. Several are the first of a scrambled (0, 2)-sequence,
-        which ``seed`` and the pixel select: any power of 2 has one in each cell of every grid of as many equal cells,
-        over the pixel and likewise over an aperture. All pass the lens of the pixel. A pair selects adaptive
-        sampling: pixels get the least number, then more up to the most, until they meet ``error``. ``"edges"``
-        takes the centre of each pixel and looks for edges where neighbours differ, see `edges`; cameras with an
-        aperture get (4, 64). Stored maps fix the number of samples.
-    error : float
-        Target of adaptive sampling: standard error of a pixel in 8-bit steps, estimated from its samples and from its
-        neighbours under the same lens; see `sampling` for the estimate and its limits. With ``"edges"``, root mean
-        square error of the pixels that get more than one ray, measured while they are sampled.
+    samples : int, (least, most) or "edges", optional
+        Rays per pixel; one if neither this nor ``error`` is given. One ray starts at the pixel's centre. Several are
+        the first of a scrambled (0, 2)-sequence, which ``seed`` and the pixel select: any power of 2 has one in each
+        cell of every grid of as many equal cells, over the pixel and likewise over an aperture. All pass the lens of
+        the pixel. A pair selects adaptive sampling: pixels get the least number, then more up to the most, until they
+        meet ``error``. ``"edges"`` takes the centre of each pixel and looks for edges where neighbours differ, see
+        `edges`; cameras with an aperture get (4, 64). Stored maps fix the number of samples.
+    error : float, optional
+        Target of adaptive sampling, 0.5 if not given: standard error of a pixel in 8-bit steps, estimated from its
+        samples and from its neighbours under the same lens; see `sampling` for the estimate and its limits. With
+        ``"edges"``, which an error alone means, root mean square error of the pixels that get more than one ray,
+        measured while they are sampled. A fixed number of samples has none.
     seed : int
         Seed of samples and noise.
     noise : float
@@ -83,8 +84,8 @@ class RenderOptions:
         If an option has another type or is out of range.
     """
 
-    samples: int | tuple[int, int] | str = 1
-    error: float = 0.5
+    samples: int | tuple[int, int] | str | None = None
+    error: float | None = None
     seed: int = 0
     noise: float = 0.0
     dtype: str = "uint8"
@@ -97,10 +98,10 @@ class RenderOptions:
     def __post_init__(self) -> None:
         if not isinstance(self.seed, int | np.integer) or not 0 <= self.seed < 1 << 63:
             raise ValueError(f"seed is {_short(self.seed)}: a whole number of at least 0 and below 2⁶³ is needed")
-        for name in ("error", "noise", "audit"):
+        for name in ("noise", "audit") if self.error is None else ("error", "noise", "audit"):
             if not isinstance(getattr(self, name), int | float | np.number):
                 raise TypeError(f"{name} is {getattr(self, name)!r}: a number is needed")
-        if not 0 < self.error < math.inf or self.error > sys.float_info.max:
+        if self.error is not None and (not 0 < self.error < math.inf or self.error > sys.float_info.max):
             raise ValueError(f"error is {_short(self.error)}: a positive number of 8-bit steps is needed")
         sampling(self.samples, self.error)
         if not 0 <= self.noise <= MOST_NOISE:

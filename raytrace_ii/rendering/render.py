@@ -363,7 +363,7 @@ def _job(scene: Scene, camera: IICamera | MapCamera, options: RenderOptions, sup
     """Return the checked job of a picture."""
     samples = options.samples
     if isinstance(camera, MapCamera):
-        if samples not in (1, camera.stored_samples):
+        if samples not in (None, 1, camera.stored_samples):
             raise ValueError(f"samples is {samples}: the maps hold {camera.stored_samples} for each pixel")
         samples = camera.stored_samples
     if isinstance(support, str) or not all(isinstance(name, str) for name in _items("support", support)):

@@ -60,32 +60,38 @@ class Edges:
 
 
 EDGES = "edges"
+ERROR = 0.5  # of adaptive samples and `EDGES`, in 8-bit steps, unless it is given
 EDGE_ERRORS = 1e-3, 1e3  # least and largest that mean anything: no set is as good, no step as large
 APERTURE_SAMPLES = 4, 64  # of `EDGES` with a camera whose rays spread over an aperture
 Sampling = int | Adaptive | Edges
 
 
-def sampling(samples: Any, error: float) -> Sampling:
-    """A number of samples, a pair or `EDGES` and an error, checked.
+def sampling(samples: Any = None, error: float | None = None) -> Sampling:
+    """A number of samples, a pair or `EDGES` and an error, checked; an error alone means `EDGES`.
 
     Raises
     ------
     ValueError
-        If a number is not whole or too small, or the error is not positive.
+        If a number is not whole or too small, or the error is not positive, or is of a fixed number.
     """
+    if samples is None:
+        samples = 1 if error is None else EDGES
+    wanted = ERROR if error is None else _error(error)
     if isinstance(samples, str):
         if samples != EDGES:
             raise ValueError(f"samples is {samples!r}: a whole number, a pair of them or {EDGES!r} is needed")
-        return Edges(min(max(_error(error), EDGE_ERRORS[0]), EDGE_ERRORS[1]))
+        return Edges(min(max(wanted, EDGE_ERRORS[0]), EDGE_ERRORS[1]))
     pair = samples if isinstance(samples, tuple) else (samples,)
     for value in pair:
         if not isinstance(value, int | np.integer) or isinstance(value, bool) or not 1 <= value <= MOST_SAMPLES:
             raise ValueError(f"samples is {value!r}: a whole number from 1 to {MOST_SAMPLES} is needed")
     if len(pair) == 1:
+        if error is not None:
+            raise ValueError(f"error is {error:g}, but the number of samples is fixed: a range like 4..64 is needed")
         return int(pair[0])
     if len(pair) != 2 or not 4 <= pair[0] <= pair[1] or any(n & (n - 1) for n in pair):
         raise ValueError(f"samples is {samples!r}: two powers of 2 are needed, at least 4 and the second not less")
-    return Adaptive(int(pair[0]), int(pair[1]), _error(error))
+    return Adaptive(int(pair[0]), int(pair[1]), wanted)
 
 
 def _error(error: float) -> float:

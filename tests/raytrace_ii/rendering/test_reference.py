@@ -64,7 +64,7 @@ def test_a_set_is_pictures_support_images_projections_a_contact_sheet_and_a_mani
     assert read_image(tmp_path / "contact.png").shape[1] == 2 * 480 + 3 * 8 - 4, "two panels in a row"
     stored = json.loads((tmp_path / "manifest.json").read_text())
     assert stored == json.loads(json.dumps(manifest))
-    options = {"samples": 2, "error": 0.5, "seed": 5, "noise": 0.0, "dtype": "uint8", "texture_filter": True}
+    options = {"samples": 2, "error": None, "seed": 5, "noise": 0.0, "dtype": "uint8", "texture_filter": True}
     assert stored["options"] == options
     assert stored["camera"][0]["name"] == "setup1" and set(stored["scenes"]) == set(NAMES)
     picture = stored["scenes"]["two"]["products"]["picture"]

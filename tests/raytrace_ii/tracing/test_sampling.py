@@ -139,15 +139,15 @@ def test_edges_of_a_picture_have_less_error_than_by_the_sequence(monkeypatch):
     scene, truth = half_plane(), {"support": (), "dtype": "float32"}
     exact = render(scene, ONE_LENS, samples=1024, **truth).picture.pixels
 
-    def error(samples):
-        pixels = render(scene, ONE_LENS, samples=samples, error=0.1, **truth).picture.pixels
+    def error(samples, **wanted):
+        pixels = render(scene, ONE_LENS, samples=samples, **wanted, **truth).picture.pixels
         return np.sqrt(np.mean((pixels - exact) ** 2))
 
-    table = error(16), error((4, 16))
+    table = error(16), error((4, 16), error=0.1)
     for name in ("fixed_places", "doubling_places"):
         monkeypatch.setattr(f"raytrace_ii.tracing.sampling.{name}", lambda samples: NO_TABLE)
     assert table[0] < 0.9 * error(16)
-    assert table[1] < error((4, 16))
+    assert table[1] < error((4, 16), error=0.1)
 
 
 def test_sums_of_samples_are_those_in_their_order_to_the_bit():
@@ -333,12 +333,21 @@ def test_edges_with_an_aperture_are_adaptive_samples():
         ((4, 16), 0.0, "error is 0.0: a positive number of 8-bit steps"),
         ((4, 16), float("nan"), "error is nan"),
         ("edges", 0.0, "error is 0.0: a positive number of 8-bit steps"),
+        (4, 0.5, "error is 0.5, but the number of samples is fixed"),
         ("corners", 1.0, "samples is 'corners': a whole number, a pair of them or 'edges' is needed"),
     ],
 )
 def test_invalid_parameters_are_refused(samples, error, says):
     with pytest.raises(ValueError, match=says):
         render(Scene(bodies=[body(wall(5))], background=UNIFORM), ONE_LENS, samples=samples, error=error)
+
+
+def test_an_error_alone_means_edges():
+    alone, edges, one = (
+        render(half_plane(), ONE_LENS, **how) for how in ({"error": 2}, {"samples": "edges", "error": 2}, {})
+    )
+    np.testing.assert_array_equal(alone.picture.pixels, edges.picture.pixels)
+    assert alone.stats.mean_samples > one.stats.mean_samples == 1
 
 
 def test_stored_maps_have_their_own_number(tmp_path):
