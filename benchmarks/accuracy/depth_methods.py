@@ -6,8 +6,9 @@
 OpenCV's stereo methods see two views, the middle one and the one four steps to the right, if
 ``opencv-python-headless`` is installed beside.
 *Growth*: parts of the field of cuboid; memory is the peak of what numpy allocates.
-*Published*: folders ``antinous`` (4D Light Field Benchmark), ``stillLife_lf_3x3`` (the benchmark of 2013; truth in
-steps of 0.22 px) and ``checker_15cm`` (a chequered plane, by a Lytro) in FOLDER.
+*Published*: those of the folders ``antinous`` (4D Light Field Benchmark; chshin10/epinet on GitHub),
+``stillLife_lf_3x3`` (the benchmark of 2013; truth in steps of 0.22 px) and ``checker_15cm`` (a chequered plane, by a
+Lytro; Vincentqyw/Depth-Estimation-Light-Field) that FOLDER has.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def main() -> None:
     ]
     keys += [{"study": "growth", "views": views, "side": side} for views, side in PARTS]
     if asked.published:
-        keys += [{"study": "published", "field": name} for name in PUBLISHED]
+        keys += [{"study": "published", "field": name} for name in PUBLISHED if (asked.published / name).is_dir()]
 
     def row(study: str, **key: Any) -> dict[str, Any]:
         if study == "method":
