@@ -51,11 +51,11 @@ def main() -> None:
     publish(tables())
 
 
-def measured(samples: int) -> dict[str, Any]:
+def measured(samples: int, many: int = PIXELS) -> dict[str, Any]:
     """Return the root mean square errors of an edge by set: [all angles, along rows and columns]."""
-    own = np.empty((PIXELS, samples, 2))
-    pixels = np.arange(PIXELS)
-    places(0, pixels, pixels, PIXELS, 0, samples, 0, np.empty((0, 2)), own.reshape(-1, 2))
+    own = np.empty((many, samples, 2))
+    pixels = np.arange(many)
+    places(0, pixels, pixels, many, 0, samples, 0, np.empty((0, 2)), (0, 0), own.reshape(-1, 2))
     sets = {"sequence": own, "own": fixed_places(samples)[None]}
     if samples & (samples - 1) == 0 and samples >= 4:
         sets["doubling"] = doubling_places(MOST)[None, :samples]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.sample_places import squares
+from benchmarks.accuracy.sample_places import measured, squares
 from ii_core import IICamera, preset
 from ii_core.camera import optics
 from raytrace_ii import Scene, render, trace
@@ -103,14 +103,10 @@ def test_places_of_a_table_are_turned_or_mirrored_alike_for_all_samples_of_a_pix
 @pytest.mark.parametrize("samples", first_fast(range(1, MOST + 1), 4))
 def test_places_of_few_samples_miss_less_of_an_edge_than_the_sequence(samples):
     """Of edges of all angles 10 to 35 % less, root mean square; along rows and columns as well."""
-    own = np.empty((200, samples, 2))
-    pixels = np.arange(200)
-    sample_kernels.places(0, pixels, pixels, 200, 0, samples, 0, NO_TABLE, NO_LENS, own.reshape(-1, 2))
-    chance = np.sqrt(np.mean([squares(one) for one in own], axis=0))
-    table = np.sqrt(squares(fixed_places(samples)))
-    assert (table < [0.9, 0.95] * chance).all()
+    found = measured(samples, 200)
+    assert (np.array(found["own"]) < np.multiply([0.9, 0.95], found["sequence"])).all()
     if samples in (4, 8, 16):
-        assert (np.sqrt(squares(doubling_places(MOST)[:samples])) < [0.95, 1.0] * chance).all()
+        assert (np.array(found["doubling"]) < np.multiply([0.95, 1.0], found["sequence"])).all()
 
 
 @pytest.mark.slow
