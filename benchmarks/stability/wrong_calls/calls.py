@@ -361,7 +361,7 @@ def of_measures(made: Made) -> dict[str, Values]:
 
 def of_scenes(made: Made) -> dict[str, Values]:
     """Values of `raytrace_ii`."""
-    options = {"samples": 1, "error": 0.5, "seed": 0, "noise": 0.0, "workers": 1, "executor": None,
+    options = {"samples": (4, 4), "error": 0.5, "seed": 0, "noise": 0.0, "workers": 1, "executor": None,
                "texture_filter": True}  # fmt: skip
     one = {**options, "dtype": "uint8", "pose": None}
     return {
