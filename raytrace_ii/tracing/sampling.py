@@ -72,7 +72,7 @@ def sampling(samples: Any = None, error: float | None = None) -> Sampling:
     Raises
     ------
     ValueError
-        If a number is not whole or too small, or the error is not positive, or is of a fixed number.
+        If a number is not whole or too small, the error is not positive, or it is of a fixed number.
     """
     if samples is None:
         samples = 1 if error is None else EDGES
@@ -87,7 +87,7 @@ def sampling(samples: Any = None, error: float | None = None) -> Sampling:
             raise ValueError(f"samples is {value!r}: a whole number from 1 to {MOST_SAMPLES} is needed")
     if len(pair) == 1:
         if error is not None:
-            raise ValueError(f"error is {error:g}, but the number of samples is fixed: a range like 4..64 is needed")
+            raise ValueError(f"error is {error:g}, but the number of samples is fixed: a pair or {EDGES!r} is needed")
         return int(pair[0])
     if len(pair) != 2 or not 4 <= pair[0] <= pair[1] or any(n & (n - 1) for n in pair):
         raise ValueError(f"samples is {samples!r}: two powers of 2 are needed, at least 4 and the second not less")
