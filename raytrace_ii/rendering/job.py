@@ -77,7 +77,7 @@ def encoded(radiance: NDArray[np.float32], rows: NDArray[np.int32], divisor: int
 
 @dataclass(frozen=True)
 class Block:
-    """Rendered tile: ``pixels`` and support images by name, and their cost."""
+    """Rendered tile: ``pixels`` and support images by name, unless they are in the picture already, and their cost."""
 
     rows: slice
     cols: slice
@@ -90,7 +90,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Job:
-    """Picture to render. `tile` runs on any thread of any process; pickling omits working arrays.
+    """Picture to render. `tile` runs on any thread of any process; pickling omits working arrays and `images`.
 
     A camera whose lens has three wavelengths has a job per channel: red and blue give their channel of the pixels,
     green all else.
@@ -111,6 +111,8 @@ class Job:
     _views: Views | None = field(default=None, init=False, compare=False, repr=False)
     _lock: threading.Lock = field(default_factory=threading.Lock, init=False, compare=False, repr=False)
     _rasters: list[Raster] = field(default_factory=list, init=False, compare=False, repr=False)
+    # Whole images by name, into which threads of this process write: to hand blocks over took 5 % of two workers.
+    images: dict[str, NDArray[Any]] = field(default_factory=dict, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         cameras = self.camera.channel_cameras() if isinstance(self.camera, IICamera) else ()
@@ -154,17 +156,32 @@ class Job:
 
     def tile(self, rows: slice, cols: slice) -> Block:
         """Render one tile, and audit it."""
-        started, audit = time.thread_time(), None
-        if self._channels:
-            block = _merged([job.tile(rows, cols) for job in self._channels])
-        elif self._views is not None:
+        started, audit, count, samples = time.thread_time(), None, RayCount(), Counter[int]()
+        if self._views is not None:
             self._local.strip = rows.start, self._strip(rows)
-            block = _joined(rows, cols, [self._tile(*part) for part in self._parts_of((rows, cols))])
-        else:
-            block = self._tile(rows, cols)
+        images = {name: image[rows, cols] for name, image in self.images.items()}
+        for part in [(rows, cols)] if self._views is None else self._parts_of((rows, cols)):
+            block = self._channel_tiles(*part) if self._channels else self._tile(*part)
+            count.add(block.count)
+            samples.update(block.samples)
+            if not images:
+                images = _room(block, rows, cols)
+            at = slice(part[0].start - rows.start, None), slice(part[1].start - cols.start, None)
+            for name, array in block.arrays.items():
+                images[name][at][: array.shape[0], : array.shape[1]] = array
         if self.audit:
-            audit = self._audited(rows, cols, block.arrays["pixels"])
-        return replace(block, audit=audit, cpu_seconds=time.thread_time() - started)
+            audit = self._audited(rows, cols, images["pixels"])
+        cost = time.thread_time() - started
+        return Block(rows, cols, {} if self.images else images, count, dict(samples), audit, cost)
+
+    def _channel_tiles(self, rows: slice, cols: slice) -> Block:
+        """Return a tile of three channels: a channel of each job, all other images of green, and the cost of all."""
+        blocks = [job.tile(rows, cols) for job in self._channels]
+        pixels = np.stack([block.arrays["pixels"][..., channel] for channel, block in enumerate(blocks)], axis=-1)
+        count = RayCount()
+        for block in blocks:
+            count.add(block.count)
+        return replace(blocks[1], arrays={**blocks[1].arrays, "pixels": pixels}, count=count)
 
     def _parts_of(self, block: Tile | None = None) -> Iterator[Tile]:
         """Return the parts of the picture, or of a block of it, that are traced at once."""
@@ -460,35 +477,10 @@ class Job:
         return shoot
 
 
-def _joined(rows: slice, cols: slice, blocks: list[Block]) -> Block:
-    """Return the tile of several parts, and the cost of all."""
-    if len(blocks) == 1:
-        return blocks[0]
-    arrays = {
-        name: np.empty((rows.stop - rows.start, cols.stop - cols.start, *part.shape[2:]), part.dtype)
-        for name, part in blocks[0].arrays.items()
-    }
-    count, samples = RayCount(), Counter[int]()
-    for block in blocks:
-        at = (
-            slice(block.rows.start - rows.start, block.rows.stop - rows.start),
-            slice(block.cols.start - cols.start, block.cols.stop - cols.start),
-        )
-        for name, part in block.arrays.items():
-            arrays[name][at] = part
-        count.add(block.count)
-        samples.update(block.samples)
-    return Block(rows, cols, arrays, count, dict(samples))
-
-
-def _merged(blocks: list[Block]) -> Block:
-    """Return the tile of three channels: a channel of each, all other images of green, and the cost of all."""
-    green = blocks[1]
-    pixels = np.stack([block.arrays["pixels"][..., channel] for channel, block in enumerate(blocks)], axis=-1)
-    count = RayCount()
-    for block in blocks:
-        count.add(block.count)
-    return replace(green, arrays={**green.arrays, "pixels": pixels}, count=count)
+def _room(block: Block, rows: slice, cols: slice) -> dict[str, NDArray[Any]]:
+    """Return room for the images of a tile, of the kinds of a part of it."""
+    shape = rows.stop - rows.start, cols.stop - cols.start
+    return {name: np.empty((*shape, *part.shape[2:]), part.dtype) for name, part in block.arrays.items()}
 
 
 def footprint(camera: Camera) -> tuple[float, float]:

@@ -159,9 +159,10 @@ def render(
     out: dict[str, NDArray[Any]] = {"pixels": np.empty((rows, columns, 3), job.dtype)}
     for name in support:
         out[name] = np.empty((rows, columns, *SUPPORT_IMAGES[name].shape), SUPPORT_IMAGES[name].dtype)
+    job.images.update(out)
     with closing(_rendered(job, job.tiles(), wanted, progress, tally)) as blocks:
         for block in blocks:
-            for name, array in block.arrays.items():
+            for name, array in block.arrays.items():  # of other processes
                 out[name][block.rows, block.cols] = array
     picture = IIPicture(out["pixels"], camera.lenses, camera.ei_pixels, camera.model, camera.erect)
     return Shot(
