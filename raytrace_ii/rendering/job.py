@@ -77,7 +77,7 @@ def encoded(radiance: NDArray[np.float32], rows: NDArray[np.int32], divisor: int
 
 @dataclass(frozen=True)
 class Block:
-    """Rendered tile: ``pixels`` and support images by name, unless they are in the picture already, and their cost."""
+    """Rendered tile: ``pixels`` and support images by name, unless they are in the picture; and their cost."""
 
     rows: slice
     cols: slice
