@@ -3,8 +3,9 @@
     python -m benchmarks run depth_confidence
 
 Spheres, slanted walls and bars of any texture, or none, under a light that casts soft shadows and highlights: 24
-fields of 9×9 views of 160² px, 24 of 3×3 to 9×9 views of 112² px, noise of 0 to 4 codes. No field of these is used to
-measure the method. Printed are `JUDGES` and `CROWD` of `ii_core.depth.estimate`, and their errors: weights of every
+fields of 9×9 views of 160² px, 24 of 3×3 to 9×9 views of 112² px, 16 of 9×9 views of 288² px, noise of 0 to 4 codes.
+No field of these is used to measure the method; only `AROUND` was chosen by *cuboid*, among windows that do as well
+here. Printed are `JUDGES` and `CROWD` of `ii_core.depth.estimate`, and their errors: weights of every
 second field tried on the others.
 """
 
@@ -22,8 +23,9 @@ from ii_core.base.colour import srgb
 from ii_core.depth import estimate
 
 SURE, BORDER, EVERY = 0.9, 8, 5  # of the pixels, every fifth is fitted
-SIGNS = (-1, -1, -1), (-1, -1, 1)  # of the terms of `agreement` and `rivalry`
-SETS = ((range(24), 160, (9,)), (range(100, 124), 112, (5, 5, 3, 9)))  # seeds, px, views a side
+SIGNS = (-1, -1, -1, 1), (-1, -1, 1, -1)  # of the terms of `agreement` and `rivalry`
+# seeds, px, views a side
+SETS = ((range(24), 160, (9,)), (range(100, 124), 112, (5, 5, 3, 9)), (range(200, 216), 288, (9,)))
 Array = np.ndarray[Any, Any]
 Body = tuple[str, Array, Array | float]  # plane: normal, point; ball: centre, radius; bar: centre, half its width
 
@@ -160,9 +162,9 @@ def terms(picture: IIPicture, true: Array) -> Terms:
     """Return the terms of both judges (H, W, n), the pixels that count, and of these, which are within 0.07 px."""
     kept: list[Any] = []
 
-    def judged(disparity: Array, ratio: Array, margin: Array, odds: Array, halves: Array) -> Array:
+    def judged(disparity: Array, ratio: Array, margin: Array, quarters: estimate.Quarters) -> Array:
         known = np.nan_to_num(disparity)
-        both = estimate.agreement(odds, halves), estimate.rivalry(known, ratio, margin)
+        both = estimate.agreement(quarters), estimate.rivalry(known, ratio, margin, quarters)
         kept.extend(np.stack([np.ones_like(known), *found], axis=-1) for found in both)
         return np.zeros_like(known)
 

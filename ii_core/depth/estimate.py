@@ -54,14 +54,16 @@ AT_ODDS, BY_NOISE, SUDDEN = 0.003, 4.0, 8
 # Confidence: labels APART px away are rivals; labels of 9×9, 5×5 and 3×3 views are 0.12, 0.24 and 0.48 px apart, so
 # that 0.48 px counts in each. A pixel is right if the views agree and no rival does as well, the product of two
 # logistic terms: `JUDGES`. Few sure pixels among unsure ones are chance: a third term, `CROWD`, has their mean over
-# AROUND px. Fitted by `python -m benchmarks run depth_confidence` to 48 fields in closed form (spheres, walls, bars,
-# shadows, highlights), whose signs are kept, and to no other field (2026-11-26).
-APART, AROUND = 0.45, 31
-JUDGES = (0.49, -0.57, -0.94, -0.53), (-4.05, -0.36, -1.11, 1.09)
-CROWD = -2.19, 0.5, 4.61
+# AROUND px. Fitted by `python -m benchmarks run depth_confidence` to 64 fields in closed form (spheres, walls, bars,
+# shadows, highlights), whose signs are kept, and to no other field. Means over 31 px do as well there; over 63 px, 42
+# instead of 34 % of `cuboid` are sure (2026-11-27).
+APART, AROUND = 0.45, 63
+JUDGES = (7.5, -0.62, -1.01, -0.65, 1.18), (-4.68, -0.55, -2.36, 0.69, -0.29)
+CROWD = -2.17, 0.63, 4.11
 LOUD = 2 * OCCLUDED  # noise in codes from which no pixel is sure: all views then count as occluded
 # Even blocks from which noise is estimated: side in px, and their share.
 BLOCK, EVEN = 8, 0.1
+ROUNDING = 0.3  # codes: beside noise
 
 
 MOST_DISPARITY = 1e4  # px a step, of a range that is given
@@ -168,11 +170,11 @@ def estimate_depth(
         disparity, sure = refined(views, disparity, noise, evidence, here, workers)
         if step > 0:
             here &= sure <= SETTLED * CODES**2
-    odds, halves = at_odds(evidence, noise)
+    quarters = at_odds(evidence, noise)
     disparity = thinned(disparity)
     told(3 + STEPS, total, "confidence")
     disparity[np.isnan(start)] = np.nan
-    confidence = judged(disparity, ratio, margin, odds, halves) / (1 + (noise / LOUD) ** SUDDEN)
+    confidence = judged(disparity, ratio, margin, quarters) / (1 + (noise / LOUD) ** SUDDEN)
     depth = None if picture.camera is None else depth_of_disparity(picture.camera, disparity)
     told(total, total, "")
     return DepthEstimate(disparity, confidence, depth, at)
@@ -299,24 +301,27 @@ def matched(views: Views, labels: Map, workers: int | None) -> tuple[Map, Map, M
     return np.asarray(ndimage.median_filter(labelled(total, labels), 3)), ratio, margin / CODES
 
 
-def judged(disparity: Map, ratio: Map, margin: Map, odds: Map, halves: Map) -> Map:
+def judged(disparity: Map, ratio: Map, margin: Map, quarters: Quarters) -> Map:
     """Return the estimated probability that disparities are within 0.07 px."""
     known = np.nan_to_num(disparity)
-    both = _logistic(JUDGES[0], agreement(odds, halves)) * _logistic(JUDGES[1], rivalry(known, ratio, margin))
+    terms = agreement(quarters), rivalry(known, ratio, margin, quarters)
+    both = _logistic(JUDGES[0], terms[0]) * _logistic(JUDGES[1], terms[1])
     right = _logistic(CROWD, crowd(both))
     return np.where(np.isnan(disparity), 0, right).astype(np.float32)
 
 
-def agreement(odds: Map, halves: Map) -> tuple[Map, ...]:
-    """Return what tells whether views agree: `at_odds` here and in the window, and halves."""
+def agreement(quarters: Quarters) -> tuple[Map, ...]:
+    """Return what tells whether views agree, in a window of planes and around, and what noise leaves of that."""
+    odds, halves, log_error = quarters
     most = ndimage.maximum_filter(odds, 2 * RADIUS + 1)
-    return np.log(odds + 0.1), np.log(most + 0.1), np.log(halves + 0.003)
+    return np.log(odds + 0.1), np.log(most + 0.1), np.log(halves + 0.003), log_error
 
 
-def rivalry(disparity: Map, ratio: Map, margin: Map) -> tuple[Map, ...]:
-    """Return what tells whether another disparity does as well: spread of disparities, `rivals`."""
+def rivalry(disparity: Map, ratio: Map, margin: Map, quarters: Quarters) -> tuple[Map, ...]:
+    """Return what tells whether another disparity does as well: spread of disparities, `rivals`, error by noise."""
     spread = ndimage.maximum_filter(disparity, 7) - ndimage.minimum_filter(disparity, 7)
-    return np.log(spread + 0.02), np.log(np.clip(ratio, 0.05, 2)), np.log(np.maximum(margin, 0) + 2)
+    rivals = np.log(np.clip(ratio, 0.05, 2)), np.log(np.maximum(margin, 0) + 2)
+    return np.log(spread + 0.02), *rivals, quarters.log_error
 
 
 def crowd(right: Map) -> tuple[Map, ...]:
@@ -358,7 +363,7 @@ def refined(
     limit, (push, weight, mean) = np.float32(OCCLUDED * CODES), evidence
     run(workers, height, kernels.add_evidence, views, known, limit, mean, around, push, weight, seen)
     mean[:] = seen
-    odds, _ = at_odds(evidence, noise)
+    odds = at_odds(evidence, noise).odds
     out, sure = known.copy(), np.zeros_like(known)
     view = views.pixels[0].astype(np.float32)
     likeness = np.float32(SAME_COLOUR * CODES), np.float32(SAME_SURFACE)
@@ -375,11 +380,20 @@ def thinned(disparity: Map) -> Map:
     return np.where(jump, ndimage.rank_filter(disparity, LOWER, 3), disparity)
 
 
-def at_odds(evidence: Evidence, noise: float) -> tuple[Map, Map]:
-    """Return by how much quarters of the views disagree over what is allowed, in windows of planes.
+class Quarters(NamedTuple):
+    """How quarters of the views agree, in windows of planes.
 
-    The second is the most that two disjoint halves of the views differ, px.
+    By how much they disagree over what is allowed, the most that two disjoint halves of the views differ, px, and the
+    logarithm of the error that noise leaves, px.
     """
+
+    odds: Map
+    halves: Map
+    log_error: Map
+
+
+def at_odds(evidence: Evidence, noise: float) -> Quarters:
+    """Return how quarters of the views agree where noise has so many codes."""
     side, (push, weight, _) = 2 * RADIUS + 1, evidence
     pushes, weights = (ndimage.uniform_filter(part, (0, side, side)) * side**2 for part in (push, weight))
     heavy = np.maximum(weights, 1)
@@ -395,7 +409,7 @@ def at_odds(evidence: Evidence, noise: float) -> tuple[Map, Map]:
             pushes[half].sum(axis=0) / np.maximum(weights[half].sum(axis=0), 1) for half in (one, np.invert(one))
         ]
         np.maximum(halves, np.abs(steps[0] - steps[1]), out=halves)
-    return odds, halves
+    return Quarters(odds, halves, np.log((noise + ROUNDING) * CODES * np.sqrt(3 / mass)))
 
 
 def noise_codes(views: Views) -> float:
