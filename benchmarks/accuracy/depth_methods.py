@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.accuracy.estimated_depth import BORDER, FIELDS, SURE, centres
+from benchmarks.accuracy.estimated_depth import BORDER, FIELDS, SURE, centres, warm_up
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, tidy
 from benchmarks.pages.tables import Tables, publish
@@ -154,12 +154,6 @@ def growth(views: int, side: int) -> dict[str, Any]:
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return {"cpu": seconds, "memory": peak / picture.pixels.nbytes}
-
-
-def warm_up() -> None:
-    """Load the kernels of `estimate_depth`."""
-    noise = np.random.default_rng(0).integers(0, 256, (144, 144, 3), np.uint8)
-    estimate_depth(IIPicture(noise, (16, 16), (9, 9)))
 
 
 def of_views(stack: np.ndarray) -> IIPicture:
