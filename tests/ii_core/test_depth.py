@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from ii_core import IICamera, IIPicture, depth_of_disparity, estimate_depth
 from ii_core.depth.all_views import disparity_of_views
@@ -70,6 +71,40 @@ def test_disparity_of_a_slanted_plane(form):
     assert np.median(error) < 0.02 and (error > 0.07).mean() < 0.12
     assert found.view == (picture.ei_pixels[0] // 2, picture.ei_pixels[1] // 2) and found.depth_mm is None
     assert found.disparity.shape == found.confidence.shape == truth.shape
+
+
+def disc(front, back, size=(72, 60), views=7, radius=17.0):
+    """Field of a textured disc before a textured wall, pixels of 2×2 rays, noise of a code; and the disparity."""
+    (k, l), half = size, views // 2
+    y, x = np.mgrid[:l, :k].astype(float)
+
+    def inside(right, down):
+        return np.hypot(right - (k - 1) / 2, down - (l - 1) / 2) < radius
+
+    light = np.zeros((l, views, k, views, 3))
+    for j, i, down, right in np.ndindex(views, views, 2, 2):
+        at = np.array([x + (right - 0.5) / 2, y + (down - 0.5) / 2])
+        near, far = (at + d * np.array([i - half, j - half])[:, None, None] for d in (front, back))
+        behind = 0.7 * texture(far[0] + 50, far[1])
+        light[:, j, :, i] += np.where(inside(*near)[..., None], texture(*near), behind) / 4
+    noisy = 255 * light + np.random.default_rng(0).normal(size=light.shape)
+    codes = np.rint(noisy.clip(0, 255)).astype(np.uint8)
+    true = np.where(inside(x, y), front, back)
+    return IIPicture(codes.reshape(l * views, k * views, 3), size, (views, views)), true
+
+
+@pytest.mark.parametrize(("front", "back"), [(1.5, -0.5), (0.4, -0.4)])
+def test_only_the_outermost_pixels_of_a_body_may_be_lost(front, back):
+    picture, truth = disc(front, back)
+    found = estimate_depth(picture)
+    bad = np.abs(found.disparity - truth) > 0.07
+    deep = ndimage.distance_transform_edt(truth == front), ndimage.distance_transform_edt(truth == back)
+    border, inner = sum(deep) <= 1, np.zeros_like(bad)
+    inner[6:-6, 6:-6] = True
+    assert not bad[inner & (truth == back)].any() and not bad[inner & ~border].any()
+    assert bad[border & (truth == front)].mean() < 0.4
+    sure = inner & (found.confidence >= 0.9)
+    assert sure.mean() > 0.6 and bad[sure].mean() < 0.02
 
 
 def test_range_is_found_and_confidence_is_honest():
