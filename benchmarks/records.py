@@ -125,7 +125,7 @@ class Records:
             name = key_of(record)
             if unsure is not None and ("unsure" in record) is not unsure:
                 continue
-            if "unsure" not in record or "unsure" in found.get(name, record):
+            if _counts_more(record, found.get(name, record)):
                 found[name] = record
         return [record for record in found.values() if only.items() <= record["key"].items()]
 
@@ -286,7 +286,7 @@ def check(path: Path) -> list[str]:
         if any(seconds) and _copied(seen.setdefault(seconds, record), record):
             first = commit_of(seen[seconds])
             wrong.append(f"{where}: seconds identical to a row of {first}, stamped {commit_of(record)}")
-        newest[key_of(record)] = record["when"] or ""
+        newest[key_of(record)] = max(newest.get(key_of(record), ""), record["when"] or "")
     lines = set(path.read_text(encoding="utf-8").splitlines())
     lost = [line for line in committed(path) if line not in lines and _counts(line) and not _replaced(line, newest)]
     return wrong + [f"{path.name}: a committed row was changed or removed"] * bool(lost)
@@ -298,12 +298,19 @@ def _replaced(line: str, newest: Mapping[str, str]) -> bool:
     return newest.get(key_of(record), "") > (record["when"] or "")
 
 
+def _counts_more(record: Record, before: Record) -> bool:
+    """Return whether a record counts instead of one of its key on a line before: merged files have any order."""
+    if "unsure" in record or "unsure" in before:
+        return "unsure" in before
+    return bool((record.get("when") or "") >= (before.get("when") or ""))
+
+
 def prune(path: Path) -> int:
     """Remove all but the newest record of each key from a file; return the number of removed lines."""
     lines, newest = lines_of(path), dict[str, tuple[Record, bytes]]()
     for line in lines:
         record = json.loads(line)
-        if "unsure" not in record or "unsure" in newest.get(key_of(record), (record,))[0]:
+        if _counts_more(record, newest.get(key_of(record), (record,))[0]):
             newest[key_of(record)] = record, line
     data = b"".join(line for _, line in newest.values())
     if len(newest) < len(lines):

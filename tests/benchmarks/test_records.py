@@ -99,9 +99,10 @@ def test_pruning_keeps_the_newest_row_of_each_key():
     for value in range(3):
         TOY.measure({"row": value % 2}, lambda value=value: {"value": value})
     append_record(TOY.path, {**TOY.newest()[1], "unsure": "by hand", "git": None})
+    append_record(TOY.path, {**TOY.newest()[0], "when": "2020-01-01", "result": {"value": 9}})  # merged in
     before = TOY.rows()
     assert [row["value"] for row in before] == [2, 1]
-    assert prune(TOY.path) == 2 and prune(TOY.path) == 0
+    assert prune(TOY.path) == 3 and prune(TOY.path) == 0
     assert TOY.rows() == before and len(TOY.path.read_text().splitlines()) == 2
 
 
