@@ -154,22 +154,25 @@ class State:
 
     def __init__(self) -> None:
         self.done, self.total, self.step = 0, 0, ""
-        self.began = self.run_began = self.updated = time.monotonic()
+        self.began = self.updated = time.monotonic()
+        self._since: tuple[int, float] | None = None  # steps and time from which on they tell the rate
 
     def update(self, done: int, total: int, step: str) -> None:
         """Set the number of steps done."""
         self.updated = time.monotonic()
-        if done < self.done:  # the next run starts from 0
-            self.run_began = self.updated
+        # the next run starts from 0; the very first step may have compiled
+        if done < self.done or (self._since is None and done):
+            self._since = done, self.updated
         self.done, self.total, self.step = done, total, one_line(step)
 
     def __str__(self) -> str:
         now = time.monotonic()
         parts = [f"{self.done}/{self.total} {self.step}".rstrip()] if self.total else []
         parts.append(_minutes(now - self.began))
-        if 0 < self.done < self.total:
-            whole = (self.updated - self.run_began) * self.total / self.done
-            parts.append(f"{_minutes(max(0.0, self.run_began + whole - now))} left")
+        if self._since is not None and self._since[0] < self.done < self.total:
+            done, since = self._since
+            rest = (self.updated - since) * (self.total - self.done) / (self.done - done)
+            parts.append(f"{_minutes(max(0.0, self.updated + rest - now))} left")
         return ", ".join(parts)
 
 

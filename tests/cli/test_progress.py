@@ -80,8 +80,12 @@ def test_time_left_is_that_of_the_run(monkeypatch):
     state = progress.State()
     assert str(state) == "0:00"
     now = 30.0
+    state.update(0, 256, "frames, run 1 of 4")
+    state.update(64, 256, "frames, run 1 of 4")  # it compiled
+    assert str(state) == "64/256 frames, run 1 of 4, 0:30"
+    now = 40.0
     state.update(128, 256, "frames, run 1 of 4")
-    assert str(state) == "128/256 frames, run 1 of 4, 0:30, 0:30 left"
+    assert str(state) == "128/256 frames, run 1 of 4, 0:40, 0:20 left"
     now = 100.0
     state.update(0, 256, "frames, run 2 of 4")
     assert str(state) == "0/256 frames, run 2 of 4, 1:40"
