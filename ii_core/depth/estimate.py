@@ -63,7 +63,7 @@ CROWD = -2.17, 0.63, 4.11
 LOUD = 2 * OCCLUDED  # noise in codes from which no pixel is sure: all views then count as occluded
 # Even blocks from which noise is estimated: side in px, and their share.
 BLOCK, EVEN = 8, 0.1
-ROUNDING = 0.3  # codes: beside noise
+ROUNDING = 0.3  # error of rounding, in codes, which counts beside noise
 
 
 MOST_DISPARITY = 1e4  # px a step, of a range that is given

@@ -249,7 +249,8 @@ class IIPicture:
             data = read_json(sidecar(path))
         except FileNotFoundError:
             raise ValueError(
-                f"{path} has no sidecar {sidecar(path).name} that gives its structure: give lenses and ei_pixels"
+                f"{path} has no sidecar {sidecar(path).name} that gives its structure: give lenses and ei_pixels in "
+                "Python, or make it by raytrace-ii import"
             ) from None
         try:
             picture = cls.from_structure_json(nothing, data)

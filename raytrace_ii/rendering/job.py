@@ -160,15 +160,15 @@ class Job:
         if self._views is not None:
             self._local.strip = rows.start, self._strip(rows)
         images = {name: image[rows, cols] for name, image in self.images.items()}
-        for part in [(rows, cols)] if self._views is None else self._parts_of((rows, cols)):
-            block = self._channel_tiles(*part) if self._channels else self._tile(*part)
+        for down, right in [(rows, cols)] if self._views is None else self._parts_of((rows, cols)):
+            block = self._channel_tiles(down, right) if self._channels else self._tile(down, right)
             count.add(block.count)
             samples.update(block.samples)
             if not images:
                 images = _room(block, rows, cols)
-            at = slice(part[0].start - rows.start, None), slice(part[1].start - cols.start, None)
+            top, left = down.start - rows.start, right.start - cols.start
             for name, array in block.arrays.items():
-                images[name][at][: array.shape[0], : array.shape[1]] = array
+                images[name][top : top + array.shape[0], left : left + array.shape[1]] = array
         if self.audit:
             audit = self._audited(rows, cols, images["pixels"])
         cost = time.thread_time() - started
