@@ -299,6 +299,7 @@ def _camera(
         lens_turn_deg=grid.turn_deg,
         lens_shear=grid.shear,
         lens_drift_mm=None if lattice.drift is None else _drift_mm(lattice.drift, pixel),
+        both_sides=True,  # micro-images are the main lens's, whose power no picture tells
     )
 
 

@@ -21,6 +21,7 @@ from ..base.checks import (
     block,
     check_fields,
     checked,
+    flag,
     length,
     number,
     numbers,
@@ -106,6 +107,9 @@ class IICamera:
     viewer_mm : float, optional
         d, distance before the lens plane at which the viewing zones of all lenses meet; parallel if not given.
         The pitch of elementary images is δL·(1 + Λ/d) of erect ones, and of others δL·(1 − Λ/d).
+    both_sides : bool
+        The array sees the image of a main lens that is not in ``optics``, on both sides of the lens plane; z is that
+        of the image. Rays do not depend on it.
     name : str
         Name in files and messages.
 
@@ -133,13 +137,14 @@ class IICamera:
     origin_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_mm: float = 0.0
     viewer_mm: float | None = None
+    both_sides: bool = False
     name: str = ""
 
     def __post_init__(self) -> None:
         def put(field: str, value: Any) -> None:
             object.__setattr__(self, field, value)
 
-        check_fields(self, optics=sequence, name=text)
+        check_fields(self, optics=sequence, both_sides=flag, name=text)
         for field in ("pixels", "lenses"):
             across, down = whole_pair(field, getattr(self, field))
             if max(across, down) > MOST_ALONG or across * down > MOST_PIXELS:
@@ -431,7 +436,7 @@ class IICamera:
             "gap_mm": self.gap_mm,
         }
         optional = ("lens_pitch_mm", "lattice", "lens_offset_mm", "lens_turn_deg", "lens_shear", "origin_mm")
-        for field in (*optional, "start_mm", "viewer_mm"):
+        for field in (*optional, "start_mm", "viewer_mm", "both_sides"):
             value = getattr(self, field)
             if value != (self._shared_pitch_mm if field == "lens_pitch_mm" else getattr(IICamera, field)):
                 data[field] = list(value) if isinstance(value, tuple) else value
@@ -464,6 +469,7 @@ class IICamera:
             "origin_mm",
             "start_mm",
             "viewer_mm",
+            "both_sides",
             "about",
             "notes",
         }

@@ -6,6 +6,7 @@ arrays of a bundle broadcast against each other.
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar, NamedTuple
 
@@ -158,9 +159,15 @@ class FrontElement(Element):
         """Return the element further away from the pixels."""
         raise NotImplementedError
 
+    def relay(self) -> NDArray[np.float64]:
+        """Return the matrix ((a, b), (c, d)) of the paraxial image (a·z + b)/(c·z + d) of a plane z; mm."""
+        raise NotImplementedError
+
     def image_mm(self, z_mm: float) -> float:
         """Return the paraxial image of a plane: where rays meet that met, or would meet, at ``z_mm``; both z, mm."""
-        raise NotImplementedError
+        z = number("z_mm", z_mm)
+        image, scale = (float(x) for x in self.relay() @ ((1.0, 0.0) if math.isinf(z) else (z, 1.0)))
+        return image / scale if scale else math.inf
 
     def pupil(self) -> tuple[float, float] | None:
         """Return z and diameter of the opening as seen from the pixels; None if it is unbounded or at infinity."""

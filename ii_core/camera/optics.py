@@ -218,10 +218,9 @@ class Lens(FrontElement):
     def moved(self, by_mm: float) -> Lens:
         return replace(self, z_mm=self.z_mm + number("by_mm", by_mm))
 
-    def image_mm(self, z_mm: float) -> float:
-        a = number("z_mm", z_mm) - self.z_mm
-        power = 1 / self.focal_mm + (1 / a if a else math.inf)  # 1/b = 1/f + 1/a
-        return self.z_mm + (1 / power if power else math.inf)
+    def relay(self) -> NDArray[np.float64]:
+        z, f = self.z_mm, self.focal_mm  # 1/b = 1/f + 1/a of the distances a and b from the lens
+        return np.array([[z + f, -z * z], [1.0, f - z]])
 
     def pupil(self) -> tuple[float, float] | None:
         return None if self.diameter_mm is None else (self.z_mm, self.diameter_mm)

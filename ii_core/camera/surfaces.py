@@ -265,11 +265,10 @@ class Surfaces(FrontElement):
         c = self.paraxial().c
         return -1 / c if c else math.inf
 
-    def image_mm(self, z_mm: float) -> float:
+    def relay(self) -> NDArray[np.float64]:
         m = self.paraxial()
-        from_vertex = self.z_mm - number("z_mm", z_mm)
-        height, slope = (m.a, m.c) if math.isinf(from_vertex) else (m.a * from_vertex + m.b, m.c * from_vertex + m.d)
-        return self.end_mm - height / slope if slope else math.inf
+        back = np.array([[self.end_mm * m.c - m.a, self.end_mm * m.d - m.b], [m.c, m.d]])  # of the way to the vertex
+        return back @ np.array([[-1.0, self.z_mm], [0.0, 1.0]])
 
     def pupil(self) -> tuple[float, float] | None:
         """Return z and diameter of the stop's paraxial image towards the pixels; None if it is at infinity."""

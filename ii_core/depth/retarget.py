@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..base import checks
 from ..base.colour import srgb
 from ..base.parallel import for_each, over_rows
-from ..camera.camera import IICamera
+from ..camera.camera import IICamera, Pair
 from ..picture.component import sub_images
 from ..picture.picture import DTYPES, IIPicture, peak
 from ..picture.view import camera_of
@@ -22,6 +22,7 @@ from .refocus import _light
 Progress = Callable[[int, int, str], Any]
 SEEN, FILLED, OUTSIDE = 2, 1, 0  # codes of the mask
 BAND = 16  # rows of target pixels at a time
+BLOCKED = -1e6  # the place of rays that a rim blocks: outside every source
 AFFINE = 1e-6  # largest deviation of rays from an affine camera, in pitches and pixels
 
 
@@ -84,8 +85,8 @@ def retarget(
     Parameters
     ----------
     picture : IIPicture
-        Source: regular, with a camera whose views are straight (no lens before the array, vertical parallax or one
-        row of views).
+        Source: regular, with a camera whose views are straight (ideal lenses before the array, vertical parallax or
+        one row of views).
     camera : IICamera
         Target; any that has rays.
     disparity : ndarray, (V, U, L, K)
@@ -113,8 +114,9 @@ def retarget(
     finite = known[np.isfinite(known)]
     if not finite.size:
         raise ValueError("disparity is nowhere known")
-    low, high = float(finite.min()), float(finite.max())
-    known = np.where(np.isfinite(known), known, np.float32(low)) * np.float32(sign)
+    side = float(max(k, l))  # px a step: what moves further is in no other view
+    low, high = (min(max(float(end), -side), side) for end in (finite.min(), finite.max()))
+    known = np.clip(np.where(np.isfinite(known), known, np.float32(low)), low, high) * np.float32(sign)
     views = np.stack([[_light(view, 1.0) for view in row] for row in sub_images(picture)])
     least, most = sorted((sign * low, sign * high))
     seen = _Views(views, known, least, most, 1 if sign > 0 else -1)
@@ -198,39 +200,46 @@ def _places(camera: IICamera, erect: bool) -> Callable[[NDArray[Any], NDArray[An
     Where a ray meets the lens plane, and its slope, are affine in lens and pixel for views that are straight: the
     coefficients follow from three rays of the camera, and a fourth checks them.
     """
-    if camera.front:
-        raise ValueError(f"{camera.front[0].kind} before the lens array bends rays: no source for retarget")
     plane = camera.origin_mm[2] + camera.gap_mm
     (k, l), (u, v) = camera.lenses, camera.ei_pixels
     if not camera.lens_model.vertical_parallax and v > 1:
         raise ValueError("the source has rows of pixels without vertical parallax: no source for retarget")
 
     def coordinates(start: NDArray[Any], way: NDArray[Any], axis: int) -> NDArray[Any]:
-        slope = way[..., axis] / way[..., 2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = way[..., axis] / way[..., 2]
         return np.stack([start[..., axis] + (plane - start[..., 2]) * slope, slope], axis=-1)
 
-    def ray(col: int, row: int, axis: int) -> NDArray[Any]:
+    def ray(lenses: Pair, pixels: Pair, axis: int) -> NDArray[Any]:
+        row = lenses[1] * v + pixels[1]
         start, way = camera.rays(rows=slice(row, row + 1))
+        col = lenses[0] * u + pixels[0]
         return coordinates(start[0, col], way[0, col], axis)
 
+    def beside(at: Pair, axis: int, by: int) -> Pair:
+        return (at[0] + by, at[1]) if axis == 0 else (at[0], at[1] + by)
+
+    # Rays near the middle: a rim before the array may block others.
+    lens, pixel, step = (k // 2, l // 2), (u // 2, v // 2), (max(k // 4, 1), max(l // 4, 1))
     matrices = []
-    for axis, (lenses, pixels) in enumerate(((k, u), (l, v))):
-
-        def at(i: int, axis: int = axis) -> NDArray[Any]:
-            return ray(i, 0, 0) if axis == 0 else ray(0, i, 1)
-
-        zero = at(0)
-        lens = (at((lenses - 1) * pixels) - zero) / (lenses - 1) if lenses > 1 else np.array([1.0, 0.0])
-        pixel = (at(pixels - 1) - zero) / (pixels - 1) if pixels > 1 else np.array([0.0, 1.0])
-        matrix = np.linalg.inv(np.stack([lens, pixel], axis=1))
-        far = matrix @ (at(lenses * pixels - 1) - zero) - [lenses - 1, pixels - 1]
-        if not (np.abs(far) < AFFINE * max(lenses, pixels)).all():
+    for axis in 0, 1:
+        zero, across, under = ray(lens, pixel, axis), np.array([1.0, 0.0]), np.array([0.0, 1.0])
+        if lens[axis]:
+            across = (zero - ray(beside(lens, axis, -step[axis]), pixel, axis)) / step[axis]
+        if pixel[axis]:
+            under = zero - ray(lens, beside(pixel, axis, -1), axis)
+        matrix = np.linalg.inv(np.stack([across, under], axis=1))
+        other = min(lens[0] + step[0], k - 1), min(lens[1] + step[1], l - 1)
+        near = max(pixel[0] - 1, 0), max(pixel[1] - 1, 0)
+        far = matrix @ (ray(other, near, axis) - zero) - [other[axis] - lens[axis], near[axis] - pixel[axis]]
+        if not (np.abs(far) < AFFINE * max(k, l, u, v)).all():
             raise ValueError("rays of the source are not those of straight views: no source for retarget")
-        matrices.append((matrix, zero))
+        matrices.append((matrix, zero, (lens[axis], pixel[axis])))
 
     def places(start: NDArray[Any], way: NDArray[Any], out: NDArray[Any]) -> None:
-        for axis, (matrix, zero) in enumerate(matrices):
-            found = (coordinates(start, way, axis) - zero) @ matrix.T
+        for axis, (matrix, zero, middle) in enumerate(matrices):
+            found = (coordinates(start, way, axis) - zero) @ matrix.T + middle
             out[..., axis], out[..., axis + 2] = found[..., 0], found[..., 1]
+        out[way[..., 2] <= 0] = BLOCKED
 
     return places

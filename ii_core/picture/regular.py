@@ -269,6 +269,7 @@ def _regular_camera(camera: IICamera, ei_pixels: Pair, *, shrink: bool) -> IICam
         origin_mm=origin,  # type: ignore[arg-type]
         start_mm=camera.start_mm,
         viewer_mm=camera.viewer_mm,
+        both_sides=camera.both_sides,
         optics=(_same_focus(camera, gap), *(element.moved(-forward) for element in camera.front)),
     )
 

@@ -1,10 +1,13 @@
 """Disparity from all views: fields in closed form, forms of fields, files of the command depth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import ndimage
 
 from ii_core import IICamera, IIPicture, depth_of_disparity, estimate_depth
+from ii_core.camera.optics import Lens
 from ii_core.depth.all_views import disparity_of_views
 from ii_core.depth.around import half_lines, views_around
 from ii_core.depth.estimate import (
@@ -128,6 +131,24 @@ def test_a_nominal_camera_does_not_limit_the_range():
     picture, truth = slanted(views=(5, 5), size=(64, 48), at=1.0)
     low, high = field_range(with_assumed_camera(picture))
     assert low < truth.min() < truth.max() < high
+
+
+@pytest.mark.parametrize("lens", [{"both_sides": True}, {"optics": [Lens(z_mm=70.0, focal_mm=50.0)]}])
+def test_behind_a_main_lens_disparities_have_both_signs(lens):
+    """Raw pictures were searched behind the plane in focus alone: near points got the depth of far ones."""
+    picture, truth = slanted(views=(5, 5), size=(64, 48), at=-0.1, slope=0.01)
+    camera = IICamera(pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=0.01, gap_mm=0.2, **lens)
+    found = estimate_depth(replace(picture, camera=camera))
+    assert np.median(np.abs(found.disparity - truth)) < 0.02
+    np.testing.assert_allclose(found.depth_mm, depth_of_disparity(camera, found.disparity))
+
+
+@pytest.mark.parametrize("at", [-0.9, 0.0])
+def test_the_range_of_many_small_views_is_that_of_what_is_seen(at):
+    """The planes of a stack were those that a camera can see: −48…0 px for disparities of −6…−1."""
+    picture, truth = slanted(views=(16, 16), size=(64, 32), at=at, slope=0.002)
+    low, high = field_range(picture)
+    assert truth.min() - 0.25 < low <= truth.min() + 0.01 and truth.max() - 0.01 <= high < truth.max() + 0.25
 
 
 def test_any_view_and_any_number_of_threads():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ii_core import IICamera, camera_names, orthoscopic, preset, view_image
+from ii_core import IICamera, camera_names, depth_of_disparity, disparity_of_depth, orthoscopic, preset, view_image
 from ii_core.camera.optics import (
     Bundle,
     Grin,
@@ -795,3 +795,22 @@ def width(x, white):
     step, middle = np.diff(white), (x[1:] + x[:-1]) / 2
     mean = (step * middle).sum() / step.sum()
     return 4 * math.sqrt(max(0.0, (step * (middle - mean) ** 2).sum() / step.sum()))
+
+
+@pytest.mark.parametrize(
+    ("name", "error"),
+    [("depth-control", 1e-9), ("plenoptic1", 1e-9), ("plenoptic2", 1e-9), ("plenoptic1-double-gauss", 0.02)],
+)
+def test_disparity_behind_lenses_is_that_of_rays_to_a_point(name, error):
+    """Rays of neighbouring lenses, and of neighbouring pixels under one, tell how views move at a depth."""
+    camera = preset(name, scale=4)
+    (k, l), (u, v) = camera.lenses, camera.ei_pixels
+    row, col = l // 2 * v + v // 2, k // 2 * u + u // 2
+    start, way = (ray[0, [col, col + 1, col + u]] for ray in camera.rays(rows=slice(row, row + 1)))
+    for z in 150.0, 240.0, 1000.0, 1e7:
+        x = start[:, 0] + (z - start[:, 2]) * way[:, 0] / way[:, 2]
+        found = float(disparity_of_depth(camera, z))
+        assert found == pytest.approx((x[1] - x[0]) / (x[2] - x[0]), rel=error, abs=error)
+        assert float(depth_of_disparity(camera, found)) == pytest.approx(z, rel=1e-6)
+    assert np.isnan(disparity_of_depth(camera, camera.front[-1].end_mm - 1)) and camera.front
+    assert np.isinf(depth_of_disparity(camera, disparity_of_depth(camera, np.inf) - 1e-3))

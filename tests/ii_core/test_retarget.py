@@ -51,6 +51,19 @@ def test_a_wall_through_cameras_of_other_lenses_and_pixels(source):
     assert (made.picture.pixels[made.mask == 0] == 0).all()
 
 
+def test_a_wall_behind_a_main_lens():
+    """Rays are affine in lens and pixel before and behind an ideal lens; the target's rim blocks a part of them."""
+    lens = {"kind": "lens", "z_mm": 20.0, "focal_mm": 8.0}
+    picture, disparity = plane_through(replace(PARALLEL, optics=("pinhole", lens)), 50.0)
+    bare = IICamera(pixels=(112, 91), lenses=(16, 13), pixel_pitch_mm=0.09, gap_mm=1.3, optics=("pinhole", lens))
+    target = replace(bare, optics=("pinhole", {**lens, "diameter_mm": 9.0}))
+    made = retarget(picture, target, disparity)
+    open_, seen = target.weighted_rays()[2] > 0, made.mask == 2
+    assert 0.3 < open_.mean() < 0.9 and 0.9 * open_.sum() < seen.sum() and not (made.mask[~open_] > 0).any()
+    inner = seen & (np.abs(made.picture.pixels - plane_through(bare, 50.0)[0].pixels).max(axis=2) < 0.02)
+    assert inner.sum() > 0.95 * seen.sum()
+
+
 def test_a_hole_beside_a_near_square_is_filled_by_the_wall():
     """A quarter of a view outside the last one, the wall beside the square was hidden from both views."""
     two = IICamera(pixels=(48, 20), lenses=(24, 20), pixel_pitch_mm=0.1, gap_mm=1.0, lens_pitch_mm=(0.2, 0.1))
