@@ -105,6 +105,7 @@ class Calibration:
         """Parameters that were assumed, since a picture does not contain them."""
         notes = [f"{what}: assumed, depth in millimetres has no scale" for what in self.assumed]
         notes.append("lens centres: the middles of micro-images stand for them, as if seen from far away")
+        notes.append("main lens: depth is that of the image that it makes, on both sides of the lens plane")
         if self.source != "white image":
             notes.append(
                 "centres: found in the picture itself, whose content pulls them about; a white image is surer"

@@ -76,7 +76,8 @@ class DepthEstimate:
     Attributes
     ----------
     disparity : ndarray of float32, (L, K)
-        Pixels a step between views, positive before the lens plane; NaN where nothing tells depths apart.
+        Pixels a step between views, positive before the lens plane; NaN where nothing tells depths apart, and where a
+        rim before the array blocks the ray.
     confidence : ndarray of float32, (L, K)
         Estimated probability that the disparity is within 0.07 px.
     depth_mm : ndarray of float64, (L, K), or None
@@ -173,7 +174,7 @@ def estimate_depth(
     quarters = at_odds(evidence, noise)
     disparity = thinned(disparity)
     told(3 + STEPS, total, "confidence")
-    disparity[np.isnan(start)] = np.nan
+    disparity[np.isnan(start) | blocked(picture, at)] = np.nan
     confidence = judged(disparity, ratio, margin, quarters) / (1 + (noise / LOUD) ** SUDDEN)
     depth = None if picture.camera is None else depth_of_disparity(picture.camera, disparity)
     told(total, total, "")
@@ -203,6 +204,15 @@ def field_range(picture: IIPicture, *, workers: int | None = None) -> tuple[floa
     first, last = values[np.searchsorted(share, np.array([0.01, 0.99]) * share[-1])]
     margin = 1.0 / float(np.abs(views.steps).max())  # a pixel in the farthest view
     return max(low, float(first) - margin), min(high, float(last) + margin)
+
+
+def blocked(picture: IIPicture, view: Pair) -> NDArray[np.bool_]:
+    """Return where a rim before the array blocks the rays of a view, (L, K)."""
+    camera, (k, l), (u, v) = picture.camera, picture.lenses, picture.ei_pixels
+    if camera is None or not camera.front:
+        return np.zeros((l, k), bool)
+    _, _, share = camera.weighted_rays_at(view[0] + u * np.arange(k), (view[1] + v * np.arange(l))[:, None])
+    return np.zeros((l, k), bool) if share is None else share == 0
 
 
 def labels_between(views: Views, low: float, high: float) -> Map:

@@ -46,7 +46,7 @@ def view_points(
     for l in range(down):
         row = l * v + view[1]
         start, direction = (ray[0, view[0] :: u] for ray in camera.rays(rows=slice(row, row + 1)))
-        with np.errstate(invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):  # rays that a rim blocks
             share = (depth_mm[l] - start[:, 2]) / direction[:, 2]
             places[l] = start + share[:, None] * direction
     known = np.isfinite(places).all(axis=2)

@@ -26,7 +26,7 @@ def false_colours(values: NDArray[Any], low: float, high: float) -> NDArray[np.u
     return np.rint(colours).astype(np.uint8)
 
 
-def preview(values: NDArray[Any], unit: str, *, turned: bool = False) -> NDArray[np.uint8]:
+def preview(values: NDArray[Any], unit: str, *, depth: bool = False) -> NDArray[np.uint8]:
     """Return a map in false colours with its scale on the right, (rows, columns + scale, 3).
 
     Parameters
@@ -34,15 +34,18 @@ def preview(values: NDArray[Any], unit: str, *, turned: bool = False) -> NDArray
     values : ndarray, (rows, columns)
     unit : str
         Written above the scale.
-    turned : bool
-        Bright is low: depths, of which near ones are to look bright as large disparities do.
+    depth : bool
+        Values are depths: near ones look bright, as large disparities do, and colours change with 1/z, so that a few
+        points near infinity do not take all of them; with z if there are depths on both sides of 0.
     """
     finite = values[np.isfinite(values)]
     low, high = (float(x) for x in np.quantile(finite, [0.005, 0.995])) if finite.size else (0.0, 1.0)
-    ends = (high, low) if turned else (low, high)
+    inverse = depth and low > 0
+    with np.errstate(divide="ignore"):
+        shown = np.where(values > 0, 1 / values, np.inf) if inverse else -values if depth else values
+    first, last = (1 / high, 1 / low) if inverse else (-high, -low) if depth else (low, high)
     zoom = max(1, -(-300 // min(values.shape)))  # small views are enlarged, so that the scale can be read
-    sign = -1.0 if turned else 1.0
-    map_ = false_colours(sign * values, *sorted((sign * low, sign * high))).repeat(zoom, 0).repeat(zoom, 1)
+    map_ = false_colours(np.where(np.isfinite(values), shown, np.nan), first, last).repeat(zoom, 0).repeat(zoom, 1)
     rows = map_.shape[0]
     canvas = np.full((rows, map_.shape[1] + SCALE, 3), 255, np.uint8)
     canvas[:, :-SCALE] = map_
@@ -54,6 +57,7 @@ def preview(values: NDArray[Any], unit: str, *, turned: bool = False) -> NDArray
     draw.text((canvas.shape[1] - SCALE + 8, 6), unit, fill=0, font=font)
     for i in range(TICKS):
         part = i / (TICKS - 1)
-        y, value = bottom - 1 - part * (bottom - top - 1), ends[0] + part * (ends[1] - ends[0])
+        y, value = bottom - 1 - part * (bottom - top - 1), first + part * (last - first)
+        value = 1 / value if inverse else -value if depth else value
         draw.text((canvas.shape[1] - SCALE + 30, y - 8), f"{value:.4g}", fill=0, font=font)
     return np.asarray(image)

@@ -78,7 +78,7 @@ def depth(
     values = found.disparity if disparity else found.depth_mm
     assert values is not None
     if preview is not None:
-        write_image(preview, picture_of(values, "px a view" if disparity else "mm", turned=not disparity))
+        write_image(preview, picture_of(values, "px a view" if disparity else "mm", depth=not disparity))
     if whole:
         moved = _as_picture(disparity_of_views(shown, found.disparity, found.view))
         values = moved if disparity or shown.camera is None else depth_of_disparity(shown.camera, moved)
