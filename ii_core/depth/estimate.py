@@ -142,12 +142,8 @@ def estimate_depth(
     Hirschmüller, Stereo processing by semiglobal matching, PAMI 2008, along four paths. Lucas and Kanade, An
     iterative image registration technique, IJCAI 1981, over all views.
     """
-    picture.check_regular()
-    (across, down), (u, v) = picture.lenses, picture.ei_pixels
-    if u * v < 2:
-        raise ValueError("the picture has one view: depth needs two or more")
-    if across < 8 or (down < 8 and v > 1):
-        raise ValueError(f"views are {across}×{down} px: at least 8×8 are needed")
+    check_views(picture)
+    u, v = picture.ei_pixels
     at = (u // 2, v // 2) if view is None else view
     if not (0 <= at[0] < u and 0 <= at[1] < v):
         raise ValueError(f"view is {at[0]},{at[1]}: columns 0–{u - 1} and rows 0–{v - 1} are there")
@@ -181,6 +177,16 @@ def estimate_depth(
     return DepthEstimate(disparity, confidence, depth, at)
 
 
+def check_views(picture: IIPicture) -> None:
+    """Refuse a picture without views whose disparity can be found."""
+    picture.check_regular()
+    (across, down), (u, v) = picture.lenses, picture.ei_pixels
+    if u * v < 2:
+        raise ValueError("the picture has one view: depth needs two or more")
+    if across < 8 or (down < 8 and v > 1):
+        raise ValueError(f"views are {across}×{down} px: at least 8×8 are needed")
+
+
 @checks.checked(picture=checks.instance(IIPicture), workers=checks.whole_from(1, 1024))
 def field_range(picture: IIPicture, *, workers: int | None = None) -> tuple[float, float]:
     """Return the lowest and the highest disparity of a regular picture's middle view, px a step between views.
@@ -188,7 +194,7 @@ def field_range(picture: IIPicture, *, workers: int | None = None) -> tuple[floa
     The search leaves the range of many small views to the camera, −48…0 px of *Apples* at scale 8, whose disparities
     are −6.4…−0.7: there they are estimated, and those of sure pixels tell the range (2026-11-27).
     """
-    picture.check_regular()
+    check_views(picture)
     u, v = picture.ei_pixels
     views = views_around(picture, (u // 2, v // 2))
     low, high = search_range(views, picture.camera, workers)

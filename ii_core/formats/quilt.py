@@ -25,7 +25,10 @@ def quilt_views(path: Path, grid: Pair | None) -> Views:
     """Return the views of a quilt; ``grid`` is (columns, rows) of tiles, by default that of the name."""
     match = QUILT.search(path.stem)
     if match is None and grid is None:
-        raise ValueError(f"{path} is no folder and its name says no _qsCxRaA: a quilt needs its grid of tiles, a lenslet picture its white picture or the pixels under a lens")
+        raise ValueError(
+            f"{path} is no folder and its name says no _qsCxRaA: a quilt needs its grid of tiles, a lenslet picture "
+            "its white picture or the pixels under a lens"
+        )
     cols, rows = grid or (int(match[1]), int(match[2]))  # type: ignore[index]
     pixels = read_view(path)
     height, width = pixels.shape[:2]

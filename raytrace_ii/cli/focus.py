@@ -73,6 +73,7 @@ def focus(
     )
     check_outputs(paths if film else [file for path in paths for file in image_file(path, _type(path))], force)
     shown = load_any(field)
+    shown.check_regular()
     if at.endswith("mm") or depth is not None or angle is not None:
         shown = with_camera(shown, str(field), angle)
     options = {"weights": _pupil(aperture, shown.ei_pixels), "bokeh": bokeh, "workers": workers}
@@ -145,7 +146,11 @@ def _plane(picture: IIPicture, at: str, tilt: str | None) -> Any:
     if unit == "px":
         return value
     if tilt is None:
-        return float(disparity_of_depth(camera_of(picture), value))
+        camera = camera_of(picture)
+        disparity = float(disparity_of_depth(camera, value))
+        if disparity != disparity:
+            raise ValueError(f"at is {at}: the scene begins beyond {camera.front[-1].end_mm:g} mm, before a lens")
+        return disparity
     try:
         right, up = (float(part) for part in tilt.split(","))
     except ValueError:

@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from ii_core import IIPicture
+from ii_core import IIPicture, preset
 from ii_core.base.colour import linear
 from ii_core.base.files import read_depth, read_image
+from ii_core.depth.preview import preview
 from ii_core.formats.pfm import read_pfm, write_pfm
 from ii_core.picture.component import sub_images
 from tests.ii_core.test_depth import slanted
@@ -111,6 +112,22 @@ def test_focus_everywhere_a_stack_and_a_tilted_plane(run, field, tmp_path):
 def test_focus_refuses(run, field, tmp_path, options, said):
     code, _, err = run("focus", field[0], "-o", tmp_path / "f.png", *options)
     assert code == 2 and said in err and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("camera", "said"), [("hexagonal", "not regular"), ("plenoptic1", "begins beyond 75 mm")])
+def test_focus_refuses_cameras(run, tmp_path, camera, said):
+    made = preset(camera, scale=8)
+    pixels = np.zeros((made.pixels[1], made.pixels[0], 3), np.uint8)
+    path = IIPicture(pixels, made.lenses, made.ei_pixels, made).save(tmp_path / "p.png")
+    code, _, err = run("focus", path, "--at", "40mm", "-o", tmp_path / "f.png")
+    assert code == 2 and said in err and not (tmp_path / "f.png").exists()
+
+
+def test_preview_of_depths_beside_infinity():
+    """Colours in steps of z went to one point near infinity, and 20 to 50 mm looked alike."""
+    z = np.array([[20.0, 25.0, 50.0, 1e9]] * 4)
+    colours = preview(z, "mm", depth=True)[0, ::75][:4].astype(int)  # a pixel is shown 75 px wide
+    assert (np.abs(np.diff(colours, axis=0)).sum(axis=1) > 40).all()
 
 
 def test_errors_of_a_map(run, field, tmp_path):
