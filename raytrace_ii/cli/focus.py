@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -148,8 +149,10 @@ def _plane(picture: IIPicture, at: str, tilt: str | None) -> Any:
     if tilt is None:
         camera = camera_of(picture)
         disparity = float(disparity_of_depth(camera, value))
-        if disparity != disparity:
-            raise ValueError(f"at is {at}: the scene begins beyond {camera.front[-1].end_mm:g} mm, before a lens")
+        if math.isnan(disparity) and camera.front:
+            raise ValueError(
+                f"at is {at}: more is needed, the lens before the array ends at {camera.front[-1].end_mm:g} mm"
+            )
         return disparity
     try:
         right, up = (float(part) for part in tilt.split(","))

@@ -114,7 +114,7 @@ def test_focus_refuses(run, field, tmp_path, options, said):
     assert code == 2 and said in err and not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("camera", "said"), [("hexagonal", "not regular"), ("plenoptic1", "begins beyond 75 mm")])
+@pytest.mark.parametrize(("camera", "said"), [("hexagonal", "not regular"), ("plenoptic1", "ends at 75 mm")])
 def test_focus_refuses_cameras(run, tmp_path, camera, said):
     made = preset(camera, scale=8)
     pixels = np.zeros((made.pixels[1], made.pixels[0], 3), np.uint8)
