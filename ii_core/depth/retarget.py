@@ -22,6 +22,7 @@ from .refocus import _light
 Progress = Callable[[int, int, str], Any]
 SEEN, FILLED, OUTSIDE = 2, 1, 0  # codes of the mask
 BAND = 16  # rows of target pixels at a time
+WIDEST = 32  # greatest disparity that is told apart, in widths of a view
 BLOCKED = -1e6  # the place of rays that a rim blocks: outside every source
 AFFINE = 1e-6  # largest deviation of rays from an affine camera, in pitches and pixels
 
@@ -114,8 +115,9 @@ def retarget(
     finite = known[np.isfinite(known)]
     if not finite.size:
         raise ValueError("disparity is nowhere known")
-    side = float(max(k, l))  # px a step: what moves further is in no other view
-    low, high = (min(max(float(end), -side), side) for end in (finite.min(), finite.max()))
+    # Far points move without bound; one view's width of it loses 0.7 dB of the quilt of *Car* (2026-11-27).
+    widest = float(WIDEST * max(k, l))
+    low, high = (min(max(float(end), -widest), widest) for end in (finite.min(), finite.max()))
     known = np.clip(np.where(np.isfinite(known), known, np.float32(low)), low, high) * np.float32(sign)
     views = np.stack([[_light(view, 1.0) for view in row] for row in sub_images(picture)])
     least, most = sorted((sign * low, sign * high))

@@ -61,7 +61,7 @@ def disparity_of_depth(camera: IICamera, z_mm: ArrayLike) -> NDArray[np.float64]
     z = np.asarray(z_mm, np.float64) - camera.origin_mm[2]
     h: Any = _relayed(camera, z, back=False) - camera.gap_mm
     with np.errstate(divide="ignore"):
-        return np.asarray(-h * step / (1 + h * meeting))
+        return np.asarray(-step / (1 / h + meeting))  # also of infinity
 
 
 @checks.checked(camera=checks.instance(IICamera), disparity=checks.numbers)

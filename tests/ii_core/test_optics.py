@@ -814,3 +814,14 @@ def test_disparity_behind_lenses_is_that_of_rays_to_a_point(name, error):
         assert float(depth_of_disparity(camera, found)) == pytest.approx(z, rel=1e-6)
     assert np.isnan(disparity_of_depth(camera, camera.front[-1].end_mm - 1)) and camera.front
     assert np.isinf(depth_of_disparity(camera, disparity_of_depth(camera, np.inf) - 1e-3))
+
+
+def test_disparity_of_infinity():
+    """A sky of infinite depth moves without bound where views are parallel, by δP·d/(Λ·δL) where they meet at d."""
+    parallel = IICamera(pixels=(40, 40), lenses=(4, 4), pixel_pitch_mm=0.1, gap_mm=2.0)
+    assert disparity_of_depth(parallel, np.inf) == -np.inf and disparity_of_depth(parallel, 2.0) == 0
+    meeting = replace(parallel, viewer_mm=80.0, lens_pitch_mm=None)
+    far, at_infinity = disparity_of_depth(meeting, [1e12, np.inf])
+    assert at_infinity == pytest.approx(-80 * 0.1 / (2 * meeting.lens_pitch_mm[0])) and far == pytest.approx(
+        at_infinity
+    )
