@@ -23,7 +23,6 @@ Progress = Callable[[int, int, str], Any]
 SEEN, FILLED, OUTSIDE = 2, 1, 0  # codes of the mask
 BAND = 16  # rows of target pixels at a time
 WIDEST = 32  # greatest disparity that is told apart, in widths of a view
-BLOCKED = -1e6  # the place of rays that a rim blocks: outside every source
 AFFINE = 1e-6  # largest deviation of rays from an affine camera, in pitches and pixels
 
 
@@ -208,7 +207,7 @@ def _places(camera: IICamera, erect: bool) -> Callable[[NDArray[Any], NDArray[An
         raise ValueError("the source has rows of pixels without vertical parallax: no source for retarget")
 
     def coordinates(start: NDArray[Any], way: NDArray[Any], axis: int) -> NDArray[Any]:
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):  # NaN where a rim blocks the ray: outside the source
             slope = way[..., axis] / way[..., 2]
         return np.stack([start[..., axis] + (plane - start[..., 2]) * slope, slope], axis=-1)
 
@@ -242,6 +241,5 @@ def _places(camera: IICamera, erect: bool) -> Callable[[NDArray[Any], NDArray[An
         for axis, (matrix, zero, middle) in enumerate(matrices):
             found = (coordinates(start, way, axis) - zero) @ matrix.T + middle
             out[..., axis], out[..., axis + 2] = found[..., 0], found[..., 1]
-        out[way[..., 2] <= 0] = BLOCKED
 
     return places
