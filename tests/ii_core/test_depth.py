@@ -14,6 +14,7 @@ from ii_core.depth.estimate import (
     CODES,
     OTHER_SURFACE,
     STEP,
+    DepthEstimate,
     costs,
     field_range,
     labels_between,
@@ -149,6 +150,16 @@ def test_the_range_of_many_small_views_is_that_of_what_is_seen(at):
     picture, truth = slanted(views=(16, 16), size=(64, 32), at=at, slope=0.002)
     low, high = field_range(picture)
     assert truth.min() - 0.25 < low <= truth.min() + 0.01 and truth.max() - 0.01 <= high < truth.max() + 0.25
+
+
+def test_unsure_pixels_do_not_widen_the_range(monkeypatch):
+    picture, _ = slanted(views=(16, 16), size=(64, 32), at=-0.9)
+    disparity, confidence = np.linspace(-2, -1, 64 * 32).reshape(32, 64), np.full((32, 64), 0.9)
+    disparity[1::2, ::2], confidence[1::2, ::2] = -30, 0.03
+    found = DepthEstimate(disparity, confidence, None, (8, 8))
+    monkeypatch.setattr("ii_core.depth.estimate.estimate_depth", lambda *_, **__: found)
+    low, high = field_range(picture)
+    assert low == pytest.approx(-2 - 1 / 8, abs=0.02) and high == pytest.approx(-1 + 1 / 8, abs=0.02)
 
 
 def test_any_view_and_any_number_of_threads():
