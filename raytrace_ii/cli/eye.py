@@ -55,7 +55,9 @@ def look(
 @app.command()
 def eye(
     context: typer.Context,
-    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar, which names its camera.")],
+    picture: Annotated[
+        Path, typer.Argument(help="An II-picture with its sidecar, which names its camera, or a coded file.")
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="A picture; with --both NAME_left and NAME_right.")],
     at: Annotated[str | None, typer.Option(help="Position of the eye, mm: x,y,z; in front if not given.")] = None,
     pupil: Annotated[float, typer.Option(help="Diameter of the pupil, mm; 0 is a point.")] = 3.0,
@@ -90,7 +92,7 @@ def eye(
 
     A point pupil, square pixels and the camera's own lens array give the view image.
     """
-    from ii_core import DisplayModel, Eye, IIPicture, eye_image, five_viewpoints
+    from ii_core import DisplayModel, Eye, eye_image, five_viewpoints
     from ii_core.base.files import write_image
     from ii_core.picture.view import camera_of
 
@@ -107,7 +109,7 @@ def eye(
         _panel(picture, calibration, paths, Eye(position_mm=(x, y, z), pupil_mm=pupil), apart, points, rays)
         return
     across, up = _numbers("shift", shift, 2)
-    shown = with_camera(IIPicture.load(picture), str(picture), angle)
+    shown = with_camera(load_any(picture), str(picture), angle)
     camera = camera_of(shown)
     display = DisplayModel(
         camera=camera, lens_pitch_mm=lens_pitch_mm, gap_mm=gap_mm, shift_mm=(across, up), turn_deg=turn,  # type: ignore[arg-type]

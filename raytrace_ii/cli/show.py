@@ -42,7 +42,7 @@ def view(
     picture: Annotated[
         Path,
         typer.Argument(
-            help="An II-picture with its sidecar; or a take: folder of frames, coded take or quilt video."
+            help="An II-picture with its sidecar, a coded file, or a take: folder of frames, coded take, quilt video."
         ),
     ],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The page, .html.")] = None,
@@ -95,10 +95,9 @@ def _compared(
     picture: Path, compare: Path | None, angle: float | None
 ) -> tuple[IIPicture, IIPicture | None, dict[str, Any]]:
     """Return both pictures, and table and labels of their comparison."""
-    from ii_core import IIPicture
     from metrics import quality_rows
 
-    original = with_camera(IIPicture.load(picture), str(picture), angle)
+    original = with_camera(load_any(picture), str(picture), angle)
     if compare is None:
         return original, None, {}
     decoded = load_any(compare)
@@ -110,7 +109,7 @@ def _compared(
 @app.command()
 def display(
     context: typer.Context,
-    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
+    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar, or a coded file.")],
     output: Annotated[
         Path,
         typer.Option(
@@ -154,7 +153,6 @@ def display(
     quilt: tiles for Looking Glass displays; lenticular: views interlaced for slanted cylindrical lenses; simulation:
     the integral-imaging display seen from one position; parallax: a film around the viewing zone.
     """
-    from ii_core import IIPicture
     from ii_core.base.files import write_image
     from ii_core.display.lenticular import lenticular
     from ii_core.display.quilt import quilt
@@ -177,10 +175,10 @@ def display(
         output = plan.path(output)
     if kind == "parallax":
         check_outputs([output], force)
-        _film(with_camera(IIPicture.load(picture), str(picture), angle), output, pixels, plane, share, frames, fps)
+        _film(with_camera(load_any(picture), str(picture), angle), output, pixels, plane, share, frames, fps)
         return
     check_outputs(image_file(output, "uint8"), force)
-    original = with_camera(IIPicture.load(picture), str(picture), angle)
+    original = with_camera(load_any(picture), str(picture), angle)
     options: dict[str, Any] = {"size": pixels, "depth_mm": plane, "cone": share}
     with spinner(f"{kind} of {picture.name}"):
         if plan is not None:
@@ -198,13 +196,12 @@ def _native(
     angle: float | None, force: bool,
 ) -> None:  # fmt: skip
     """Write the picture of a Looking Glass's own panel."""
-    from ii_core import IIPicture
     from ii_core.base.files import write_image
     from ii_core.display.looking_glass import native_picture, read_looking_glass
 
     check_outputs(image_file(output, "uint8"), force)
     display = read_looking_glass(calibration)
-    original = with_camera(IIPicture.load(picture), str(picture), angle)
+    original = with_camera(load_any(picture), str(picture), angle)
     with spinner(f"panel picture of {picture.name}"):
         write_image(output, native_picture(original, display, depth_mm=plane, cone=cone, whole=whole))
     say_done(f"{output}: {display.size[0]}×{display.size[1]} px, for the display of {calibration.name} alone")

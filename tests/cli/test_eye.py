@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from codec import encode
 from ii_core import IIPicture, five_viewpoints, preset, view_image, with_assumed_camera
 from ii_core.base.files import read_image
 from ii_core.camera.maps import FORMATS
@@ -87,6 +88,18 @@ def test_all_commands_assume_the_same_camera(run, refused, path, tmp_path, comma
     assert same == (command in ("look", "eye"))  # from the front, every angle shows the middle pixels
     refused(run(command, path, *more, "--angle", "35", "-o", tmp_path / f"no{kind}"), "has a camera")
     refused(run(command, bare, *more, "--angle", "180", "-o", tmp_path / f"no{kind}"), "angle is 180°")
+
+
+@pytest.mark.parametrize("command", ["look", "eye", "view", "display"])
+def test_a_coded_file_is_shown_as_its_picture(run, path, tmp_path, command):
+    encode(IIPicture.load(path), "ei-ffv1").save(tmp_path / "c.ii")
+    kind = {"view": ".html", "display": ".gif"}.get(command, ".png")
+    more = {"eye": ["--pupil", "0"], "display": ["--frames", "2", "--size", "64x32"]}.get(command, [])
+    for name, source in ("coded", tmp_path / "c.ii"), ("plain", path):
+        code, _, err = run(command, source, *more, "-o", tmp_path / f"{name}{kind}")
+        assert code == 0 and not err
+    if command != "view":  # its page has the name of the picture
+        assert (tmp_path / f"coded{kind}").read_bytes() == (tmp_path / f"plain{kind}").read_bytes()
 
 
 def test_an_assumed_angle_is_that_of_the_border():
