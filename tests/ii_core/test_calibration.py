@@ -30,6 +30,8 @@ from ii_core import (
     calibrated_picture,
     centres_picture,
     defective_pixels,
+    disparity_of_depth,
+    estimate_depth,
     preset,
     resampled,
     sub_images,
@@ -42,6 +44,7 @@ from ii_core.calibration.multi_focus import fused, lens_foci, of_camera, shifts_
 from ii_core.calibration.white import FLOOR, averaged, gain
 from ii_core.formats.lytro import RawColour
 from ii_core.formats.mosaic import load_mosaic
+from raytrace_ii import load_scene, render
 from tests.support.slow import first_fast
 
 
@@ -582,3 +585,20 @@ def test_import_of_a_multi_focus_picture(run, refused, multi_focus, tmp_path):
     refused(
         run("import", tmp_path / "f.png", "--ei-pixels", "2x2", "-o", tmp_path / "g.png", "--foci", "2,3"), "--whites"
     )
+
+
+@pytest.mark.slow
+def test_depth_of_a_raw_picture_whose_points_are_all_before_the_plane_in_focus():
+    """Rendered through a double Gauss. The camera is not told of it: its exit pupil's distance scales disparities."""
+    camera = preset("plenoptic1-double-gauss", scale=4)
+    shot = render(load_scene("cuboid"), camera, samples=4, support=("depth",))
+    places = [(x, y) for x in (0.2, 0.5, 0.8) for y in (0.2, 0.5, 0.8)]
+    share = np.mean([camera.weighted_rays(sample=place)[2] for place in places], axis=0)[..., None]
+    noise = np.random.default_rng(0).normal(0, 3, share.shape)
+    white = np.repeat((215 * share + noise).clip(0, 255), 3, 2).astype(np.uint8)
+    found = calibrate(shot.picture.pixels, white=white)
+    field = resampled(calibrated_picture(found, shot.picture.pixels, white=white, curve="srgb"))[0]
+    (u, v), estimate = camera.ei_pixels, estimate_depth(field).disparity
+    truth = disparity_of_depth(camera, shot.depth[v // 2 :: v, u // 2 :: u])
+    assert np.nanmin(truth) > 0.3 and (estimate > 0).mean() > 0.98
+    assert 0.93 < np.nanmedian(estimate / truth) < 1.03
