@@ -1,5 +1,6 @@
 """Installation without extras: rendering, coding and measuring, and errors on missing libraries."""
 
+import gc
 import json
 import os
 import subprocess
@@ -11,7 +12,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba.core import event
 
+from ii_core.base import jit
 from ii_core.base.extras import EXTRAS
 from ii_core.base.parallel import cores, over_rows
 
@@ -107,3 +110,46 @@ def test_one_thread_per_core_and_none_extra_for_one_range():
     assert len(names) == cores()
     over_rows(lambda first, last: names.add(threading.get_ident()), 64, workers=1)
     assert threading.get_ident() in names
+
+
+def test_a_kernel_keeps_its_rounding_and_its_size_whoever_calls_it():
+    """Numba hands options that a kernel leaves open down from the kernel that calls it first."""
+
+    @jit.exact_stage_kernel
+    def exact(a, b, c):
+        return a * b + c
+
+    @jit.part_kernel
+    def part(a, b, c):
+        return exact(a, b, c)
+
+    @jit.stage_kernel
+    def stage(a, b, c):
+        return part(a, b, c)
+
+    def first(a, b, c):
+        return stage(a, b, c)
+
+    # The product is 1 − 2⁻⁶⁰, which rounds to 1: one rounding of both operations gives −2⁻⁶⁰.
+    assert jit.lean_kernel(first)(1 + 2**-30, 1 - 2**-30, -1.0) == 0
+    (compiled,) = part.overloads.values()
+    assert not compiled.fndesc.inline
+
+
+def test_garbage_is_looked_for_less_often_while_numba_compiles_alone():
+    before, during = gc.get_threshold(), []
+
+    @jit.kernel
+    def doubled(x):
+        return 2 * x
+
+    class Listener(event.Listener):
+        def on_start(self, event):
+            during.append(gc.get_threshold())
+
+        def on_end(self, event):
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        doubled(1)
+    assert during[0][0] > before[0] and gc.get_threshold() == before

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel, tuned_kernel
+from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel
 
 from .contexts import ELEMENT_OF, ELEMENT_WEIGHTS, HISTORY, PLACE_OF, RECENT
 
@@ -217,7 +217,7 @@ def _learn_three(contexts, weights, of, odds, missed, bit):
     _learn(contexts, of[2], bit)
 
 
-@tuned_kernel
+@part_kernel
 def _code_refined(coder, context, bit):
     """As `code_bit`, mixed with the bits of the same element before."""
     contexts, element = coder.contexts, np.int64(ELEMENT_OF[context])
@@ -232,7 +232,7 @@ def _code_refined(coder, context, bit):
     return bit
 
 
-@tuned_kernel
+@part_kernel
 def code_of_four(coder, one, other, third, fourth, weights, bit):
     """As `code_mixed`, of four contexts; the fourth weight stands in the row after the others."""
     contexts, of = coder.contexts, (one, other, third)
@@ -246,7 +246,7 @@ def code_of_four(coder, one, other, third, fourth, weights, bit):
     return bit
 
 
-@tuned_kernel
+@part_kernel
 def code_bit(coder, context, bit):
     """Write or read a bit in a context, which learns it; return it."""
     if coder.state[REFINED]:
@@ -256,7 +256,7 @@ def code_bit(coder, context, bit):
     return bit
 
 
-@tuned_kernel
+@part_kernel
 def code_mixed(coder, one, other, weights, bit):
     """Write or read a bit by two contexts: their log odds are added by weights, which learn as well (Mahoney 2005).
 
@@ -274,7 +274,7 @@ def code_mixed(coder, one, other, weights, bit):
     return bit
 
 
-@tuned_kernel
+@part_kernel
 def code_raw(coder, bit):
     """Write or read a bit of even odds."""
     return _code_below(coder, coder.state[RANGE] >> 1, bit)
@@ -283,7 +283,7 @@ def code_raw(coder, bit):
 MOST_DIGITS = 24
 
 
-@tuned_kernel
+@part_kernel
 def code_number(coder, first, count, order, value):
     """Write or read a number from 0 up: an Exp-Golomb code whose prefix has contexts first … first + count - 1."""
     total = value + (1 << order)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import array_kernel, part_kernel, stage_kernel, tuned_kernel
+from ii_core.base.jit import array_kernel, part_kernel, stage_kernel
 
 from . import contexts as at
 from . import motion
@@ -53,7 +53,7 @@ LIMIT = 8191  # of a decoded sample's magnitude, in eighths of an 8-bit code
 MOST_INDEX = 1 << 14
 
 
-@tuned_kernel
+@part_kernel
 def split_context(job, by, bx, log):
     """By how many of the blocks above and left are smaller, and doubt."""
     blocks = job.blocks
@@ -65,7 +65,7 @@ def split_context(job, by, bx, log):
     return at.SPLIT + ((log - 3) * 3 + count) * 4 + doubt_class(job, by, bx, (log, log))
 
 
-@tuned_kernel
+@part_kernel
 def residual_context(job, by, bx, shape, kind):
     """By size, kind, how many of the blocks above and left have a residual, and doubt."""
     other = 0 if kind == SYNTHESIS else 1
@@ -75,7 +75,7 @@ def residual_context(job, by, bx, shape, kind):
     return at.RESIDUAL + (((size_of(shape) - 2) * 2 + other) * 3 + like) * 4 + doubt_class(job, by, bx, shape)
 
 
-@tuned_kernel
+@part_kernel
 def coded_context(plane, shape, kind, first, skipped):
     """By plane, size, kind, whether the first plane has a residual, and whether the transform is skipped."""
     if skipped == 1:
@@ -83,13 +83,13 @@ def coded_context(plane, shape, kind, first, skipped):
     return at.CODED + ((plane * 4 + size_of(shape) - 2) * 2 + (1 if kind == INTRA else 0)) * 2 + first
 
 
-@tuned_kernel
+@part_kernel
 def skipped_context(job, by, bx, shape):
     """By size, and how many of the blocks above and left have no transform."""
     return at.SKIPPED + (size_of(shape) - 2) * 3 + neighbours(job.blocks, np.int64(SKIPPED), np.int64(1), by, bx)
 
 
-@tuned_kernel
+@part_kernel
 def _code_residual(coder, job, by, bx, shape, kind, direction, coded):
     """Write or read whether a block has a residual."""
     context = residual_context(job, by, bx, shape, kind)
@@ -109,7 +109,7 @@ def _code_residual(coder, job, by, bx, shape, kind, direction, coded):
     return code_of_four(coder, context, moded, near, formed, at.MODE_WEIGHTS + 10, coded)
 
 
-@tuned_kernel
+@part_kernel
 def predict_explicit(job, work, y0, x0, shape, index, mask):
     """work.predicted = the mean of the masked references at a disparity."""
     (h, w), d = sides(shape), index * job.unit
@@ -140,7 +140,7 @@ def predict_explicit(job, work, y0, x0, shape, index, mask):
                     predicted[p, y, x] = np.int32(predicted[p, y, x] + np.int32(1 << (shift - 1))) >> shift
 
 
-@tuned_kernel
+@part_kernel
 def predict_synthesis(job, work, y0, x0, shape):
     """work.predicted = the synthesised view."""
     h, w = sides(shape)
@@ -150,14 +150,14 @@ def predict_synthesis(job, work, y0, x0, shape):
                 work.predicted[p, y, x] = job.made[p, y0 + y, x0 + x]
 
 
-@tuned_kernel
+@part_kernel
 def predict_direction(job, work, plane, y0, x0, shape, direction):
     """work.predicted[plane] from the block's surroundings."""
     fill_border(job.views, job.at, plane, job.blocks, np.int64(DONE), y0, x0, shape, work.border, job.directed)
     predict_intra(work.border, direction, shape, work.predicted, plane, job.directed)
 
 
-@tuned_kernel
+@part_kernel
 def store(job, work, plane, y0, x0, shape, residual):
     """Decoded samples: the prediction, and work.block if there is a residual."""
     h, w = sides(shape)
@@ -169,7 +169,7 @@ def store(job, work, plane, y0, x0, shape, residual):
             job.views[job.at, plane, y0 + y, x0 + x] = value
 
 
-@tuned_kernel
+@part_kernel
 def mark(blocks, by, bx, shape, leaf, kind, index, mask, direction, coded):
     """Note a block as decoded."""
     h, w = sides(shape)
@@ -185,7 +185,7 @@ def mark(blocks, by, bx, shape, leaf, kind, index, mask, direction, coded):
             blocks[DONE, y, x] = 1
 
 
-@tuned_kernel
+@part_kernel
 def mark_block(job, by, bx, shape, leaf, kind, index, mask, direction, coded):
     """Note a block as decoded, and its vector if there are earlier instants."""
     if job.past.shape[0]:
@@ -194,7 +194,7 @@ def mark_block(job, by, bx, shape, leaf, kind, index, mask, direction, coded):
     mark(job.blocks, by, bx, shape, leaf, kind, 0 if kind >= TIMED else index, mask, direction, coded)
 
 
-@tuned_kernel
+@part_kernel
 def _load_levels(job, work, plane, y0, x0, shape):
     """work.levels = the encoder's; return whether one is not zero."""
     (h, w), found = sides(shape), 0
@@ -207,7 +207,7 @@ def _load_levels(job, work, plane, y0, x0, shape):
     return found
 
 
-@tuned_kernel
+@part_kernel
 def _note_levels(job, work, plane, y0, x0, shape):
     """job.levels = those decoded, contexts of the planes that follow."""
     h, w = sides(shape)
@@ -216,7 +216,7 @@ def _note_levels(job, work, plane, y0, x0, shape):
             job.levels[plane, y0 + y, x0 + x] = work.levels[y, x]
 
 
-@tuned_kernel
+@part_kernel
 def note_skipped(blocks, by, bx, shape, skipped):
     """Note whether a block has no transform."""
     h, w = sides(shape)
@@ -225,7 +225,7 @@ def note_skipped(blocks, by, bx, shape, skipped):
             blocks[SKIPPED, y, x] = skipped
 
 
-@tuned_kernel
+@part_kernel
 def _clear(levels, shape):
     h, w = sides(shape)
     for y in range(h):
@@ -233,7 +233,7 @@ def _clear(levels, shape):
             levels[y, x] = 0
 
 
-@tuned_kernel
+@part_kernel
 def _code_transform(coder, shape, kind):
     """Write or read the kind of transform of an intra block."""
     context = np.int64(at.TRANSFORM + (size_of(shape) - 2) * 3)
@@ -256,7 +256,7 @@ def transform_cost(costs, shape, kind):
     return bits
 
 
-@tuned_kernel
+@part_kernel
 def code_block(coder, job, work, y0, x0, shape, leaf):
     """Write a block that is marked, or read and decode one."""
     by, bx = y0 >> 2, x0 >> 2
@@ -333,7 +333,7 @@ def _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped, direct
     return some, cross
 
 
-@tuned_kernel
+@part_kernel
 def part_ways(job, shape, depth):
     """Ways to halve a block: 1 into an upper and a lower half, 2 into a left and a right one, 3 both, 0 none."""
     if depth >= job.parted:
@@ -341,7 +341,7 @@ def part_ways(job, shape, depth):
     return (1 if shape[0] > LOG_LEAST else 0) + (2 if shape[1] > LOG_LEAST else 0)
 
 
-@tuned_kernel
+@part_kernel
 def part_context(job, by, bx, shape):
     """By area, and how many of the blocks above and left are narrower and lower."""
     blocks = job.blocks
@@ -353,7 +353,7 @@ def part_context(job, by, bx, shape):
     return at.PARTED + (6 if job.references.shape[0] else 0) * 3 + (shape[0] + shape[1] - 5) * 3 + count
 
 
-@tuned_kernel
+@part_kernel
 def across_context(job, by, bx, shape):
     """Of halves beside each other: by form, and whether the block above is narrower, or the one left lower."""
     blocks = job.blocks
@@ -363,7 +363,7 @@ def across_context(job, by, bx, shape):
     return at.ACROSS + form * 3 + (1 + narrow - low)
 
 
-@tuned_kernel
+@part_kernel
 def code_way(coder, job, by, bx, shape, ways, way):
     """Write or read how a block is halved: 0 for not."""
     if not ways or not code_bit(coder, part_context(job, by, bx, shape), 1 if way else 0):
@@ -390,7 +390,7 @@ def halved(shape, way):
     return (shape[0] - 1, shape[1]) if way == 1 else (shape[0], shape[1] - 1)
 
 
-@array_kernel
+@part_kernel
 def code_parts(coder, job, work, y0, x0, shape, leaf, depth):
     """Write or read the blocks of a square that is not split; ``leaf`` is its size and how it was parted."""
     by, bx = y0 >> 2, x0 >> 2

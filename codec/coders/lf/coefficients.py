@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import fused, part_kernel, stage_kernel, tuned_kernel
+from ii_core.base.jit import fused, part_kernel, stage_kernel
 
 from .arithmetic import REFINED, bit_cost, code_bit, code_mixed, code_number, code_of_four, code_raw, number_cost
 from .contexts import (
@@ -140,7 +140,7 @@ def _beside(planes, plane, corner, y, x, h, w, near, dependent):
     return (found * 2 + around) * 4 + (near if near < 2 else (2 if near < 4 else 3))
 
 
-@tuned_kernel
+@part_kernel
 def code_coefficients(coder, levels, plane, shape, intra, ways, planes, corner, turn):
     """Write or read levels[:h, :w], of which one at least is not zero; a reader finds only zeros there before.
 
@@ -496,7 +496,7 @@ def quantise_dependent(costs, coefficients, plane, shape, step, weight, levels, 
     return bits, nothing + least - weight * bits
 
 
-@tuned_kernel
+@part_kernel
 def dequantise(levels, shape, step, coefficients, dependent):
     """Fill coefficients[:h, :w] where they are not zero; return the rows and columns that hold them.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import part_kernel, tuned_kernel
+from ii_core.base.jit import part_kernel
 
 from . import contexts as at
 from .arithmetic import bit_cost, code_bit
@@ -18,7 +18,7 @@ from .transform import inverse, sides
 MOST_CROSS = 4  # units
 
 
-@tuned_kernel
+@part_kernel
 def code_cross(coder, plane, log, cross):
     """Write or read the factor."""
     context = at.CROSS + (plane - 1) * 8
@@ -43,7 +43,7 @@ def cross_cost(costs, plane, log, cross):
     return bits
 
 
-@tuned_kernel
+@part_kernel
 def keep_first(work, rows, cols):
     """Remember work.coefficients[:rows, :cols] as the first plane's."""
     work.reach[0], work.reach[1] = rows, cols
@@ -75,7 +75,7 @@ def subtract_cross(work, cross, shift):
             work.coefficients[y, x] -= (cross * work.first[y, x]) >> shift
 
 
-@tuned_kernel
+@part_kernel
 def rebuild(work, levels, shape, step, some, cross, shift, skipped, dependent):
     """work.block = the residual, of levels if there are ``some``, and of the first plane by a factor in 2^-shift.
 

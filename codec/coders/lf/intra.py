@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import stage_kernel, tuned_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from .transform import LARGEST, sides, size_of
 
@@ -27,7 +27,7 @@ def turn_class(mode):
     return np.int64(TURNS[mode])
 
 
-@tuned_kernel
+@part_kernel
 def fill_border(views, at, plane, blocks, done, y0, x0, shape, border, smoothed):
     """border[0] = the corner and h + w samples above, border[1] = the corner and h + w to the left.
 
@@ -67,7 +67,7 @@ def fill_border(views, at, plane, blocks, done, y0, x0, shape, border, smoothed)
             into[both] = row[both]
 
 
-@tuned_kernel
+@part_kernel
 def predict_along(border, mode, shape, square, smoothed):
     """square[:h, :w] = the prediction by a direction; if that comes from the left, lying: rows are columns."""
     from_left = mode >= FROM_LEFT
@@ -94,7 +94,7 @@ def predict_along(border, mode, shape, square, smoothed):
         _draw_straight(other, square, reach, length, fade)
 
 
-@tuned_kernel
+@part_kernel
 def predict_intra(border, mode, shape, out, plane, smoothed):
     """out[plane, :h, :w] = the prediction; from version 9 on, ``smoothed``."""
     square, (h, w), log = out[plane], sides(shape), size_of(shape)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import part_kernel, tuned_kernel
+from ii_core.base.jit import part_kernel
 
 from . import contexts as at
 from . import motion
@@ -17,20 +17,20 @@ from .warp import LATTICE, led
 DIFFERENT = 205  # disparities that lead this far apart, in 2^-8 samples, are of different surfaces
 
 
-@tuned_kernel
+@part_kernel
 def synthesis_context(job, by, bx, shape):
     """By size, how many of the blocks above and left are synthesised, and doubt."""
     like = neighbours(job.blocks, np.int64(KIND), np.int64(SYNTHESIS), by, bx)
     return at.SYNTHESIS + ((size_of(shape) - 2) * 3 + like) * 4 + doubt_class(job, by, bx, shape)
 
 
-@tuned_kernel
+@part_kernel
 def mixed_context(job, by, bx, shape):
     """By size, and how many of the blocks above and left are mixed."""
     return at.MIXED + (size_of(shape) - 2) * 3 + neighbours(job.blocks, np.int64(KIND), np.int64(MIXED), by, bx)
 
 
-@tuned_kernel
+@part_kernel
 def guesses(job, by, bx, shape):
     """Indices that the synthesis and the blocks left and above suggest; below the range where there is none."""
     none = job.low - 1
@@ -46,7 +46,7 @@ def guesses(job, by, bx, shape):
     return made, left, above
 
 
-@tuned_kernel
+@part_kernel
 def from_where(job, by, bx, shape, index):
     """Return the source that predicts an index: 1 synthesis, 2 block to the left, 3 block above, 0 none."""
     made, left, above = guesses(job, by, bx, shape)
@@ -58,7 +58,7 @@ def from_where(job, by, bx, shape, index):
     return 3 if above > none and index == above else 0
 
 
-@tuned_kernel
+@part_kernel
 def seen_mask(job, by, bx, shape, index):
     """The references whose own disparity agrees at three of five places of the block, or is not known."""
     height, width = job.disparities.shape[1:]
@@ -86,7 +86,7 @@ def seen_mask(job, by, bx, shape, index):
     return seen
 
 
-@tuned_kernel
+@part_kernel
 def expected_mask(job, by, bx, where, seen):
     """The references of the block left or above, or those that see the block; and a context."""
     left = above = np.int64(0)
@@ -104,13 +104,13 @@ def expected_mask(job, by, bx, where, seen):
     return expected, at.SAME_MASK + 2 * where + (1 if left == above else 0) + (8 if expected == seen else 0)
 
 
-@tuned_kernel
+@part_kernel
 def _made_context(made, left, none, shape):
     """By size, and whether the block left has the same index, another, or none."""
     return at.MERGE + (size_of(shape) - 2) * 5 + (0 if left <= none else (1 if left == made else 2))
 
 
-@tuned_kernel
+@part_kernel
 def code_kind(coder, job, by, bx, shape, kind, index, mask, direction):
     """Write or read how a block is predicted; return kind, index, mask and direction.
 
@@ -146,7 +146,7 @@ def code_kind(coder, job, by, bx, shape, kind, index, mask, direction):
     return kind, index, mask, direction
 
 
-@tuned_kernel
+@part_kernel
 def _code_index(coder, job, by, bx, shape, index):
     made, left, above = guesses(job, by, bx, shape)
     none = job.low - 1
@@ -165,7 +165,7 @@ def _code_index(coder, job, by, bx, shape, index):
     return min(max(base + size, job.low), job.high)
 
 
-@tuned_kernel
+@part_kernel
 def _code_mask(coder, job, by, bx, where, seen, mask):
     expected, context = expected_mask(job, by, bx, where, seen)
     if code_bit(coder, context, 1 if mask == expected else 0):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import part_kernel, stage_kernel, tuned_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from . import contexts as at
 from .arithmetic import REFINED, bit_cost, code_bit, code_of_four, code_raw
@@ -15,7 +15,7 @@ from .transform import size_of
 SIDE, STRAIGHT = 17, 8  # directions from one side, and the place of the straight one among them
 
 
-@tuned_kernel
+@part_kernel
 def likely_directions(blocks, by, bx):
     """Two intra modes, from the blocks left and above."""
     first = np.int64(blocks[DIRECTION, by, bx - 1]) if bx > 0 else SMOOTH
@@ -25,7 +25,7 @@ def likely_directions(blocks, by, bx):
     return first, second
 
 
-@tuned_kernel
+@part_kernel
 def mode_contexts(job, by, bx, shape):
     """Of the first likely mode, the second, flat or smooth, and which of these; the last is -1 of even bits."""
     if not job.directed:
@@ -38,7 +38,7 @@ def mode_contexts(job, by, bx, shape):
     return first, first + 16, np.int64(at.UNDIRECTED + size_of(shape) - 2), np.int64(at.UNDIRECTED + 4)
 
 
-@tuned_kernel
+@part_kernel
 def code_mode(coder, job, by, bx, shape, mode):
     """Write or read an intra mode: one of two likely ones, flat, smooth, or a direction."""
     if coder.state[REFINED]:
@@ -59,7 +59,7 @@ def code_mode(coder, job, by, bx, shape, mode):
     return 2 + (SIDE * side + STRAIGHT if straight else _code_slope(coder, value, side))
 
 
-@tuned_kernel
+@part_kernel
 def _code_mode_around(coder, job, by, bx, shape, mode):
     """As `code_mode`, from version 12 on: contexts are of the modes around, and mixed."""
     blocks = job.blocks
@@ -124,7 +124,7 @@ def _code_likely(coder, likely, which, one, where, around, like, form):
     return code_of_four(coder, one, near, alike, formed, at.MODE_WEIGHTS + 2 * which, 1 if where == likely else 0)
 
 
-@tuned_kernel
+@part_kernel
 def _code_direction(coder, value):
     """34 directions: 30 of five bits, the last 4 of six."""
     long = value >= 30
@@ -137,7 +137,7 @@ def _code_direction(coder, value):
     return min(found, 33)
 
 
-@tuned_kernel
+@part_kernel
 def _code_slope(coder, value, side):
     """The directions of a side but the straight one: which way it turns, and how far."""
     slope = value - SIDE * side - STRAIGHT

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel, tuned_kernel
+from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel
 
 from . import contexts as at
 from .arithmetic import bit_cost, code_bit, code_number, number_cost
@@ -53,7 +53,7 @@ def noted(job, view, by, bx):
     )
 
 
-@tuned_kernel
+@part_kernel
 def note(job, by, bx, shape, in_time, vector):
     """Note the vector of a decoded block."""
     past, down, across = unpacked(vector)
@@ -66,7 +66,7 @@ def note(job, by, bx, shape, in_time, vector):
             job.motions[job.at, ACROSS, y, x] = across
 
 
-@tuned_kernel
+@part_kernel
 def inherited(job, by, bx, shape):
     """Vector of the nearest view of the same instant at what the block shows; and whether it is predicted in time.
 
@@ -86,7 +86,7 @@ def inherited(job, by, bx, shape):
     return noted(job, view, j, i), 1 + np.int64(job.motions[view, IN_TIME, j, i])
 
 
-@tuned_kernel
+@part_kernel
 def guesses(job, by, bx, shape):
     """Vectors inherited, of the block left and of the block above; `NONE` where these are not predicted in time."""
     left = above = np.int64(NONE)
@@ -97,7 +97,7 @@ def guesses(job, by, bx, shape):
     return inherited(job, by, bx, shape)[0], left, above
 
 
-@tuned_kernel
+@part_kernel
 def time_context(job, by, bx, shape):
     """By size, how many of the blocks above and left are predicted in time, and the inherited block."""
     motions, like = job.motions, 0
@@ -108,7 +108,7 @@ def time_context(job, by, bx, shape):
     return at.IN_TIME + ((size_of(shape) - 2) * 3 + like) * 3 + inherited(job, by, bx, shape)[1]
 
 
-@tuned_kernel
+@part_kernel
 def code_vector(coder, job, by, bx, shape, vector):
     """Write or read a vector."""
     first, left, above = guesses(job, by, bx, shape)
@@ -137,7 +137,7 @@ def _first_context(context, first, left):
     return context + (0 if left == NONE else (1 if left == first else 2))
 
 
-@tuned_kernel
+@part_kernel
 def _code_component(coder, first, value):
     size = code_number(coder, np.int64(first), np.int64(14), np.int64(1), abs(value))
     if size:
@@ -177,7 +177,7 @@ def _component_cost(costs, first, value):
     return bits + bit_cost(costs, first + 14, 1 if value < 0 else 0) if value else bits
 
 
-@tuned_kernel
+@part_kernel
 def move(job, work, planes, y0, x0, shape, vector):
     """work.predicted = the first planes of the same view at an earlier instant, moved by a vector."""
     past, down, across = unpacked(vector)
@@ -193,7 +193,7 @@ def move(job, work, planes, y0, x0, shape, vector):
                 predicted[p, y, x] = np.int32(predicted[p, y, x] + np.int32(2048)) >> 12
 
 
-@tuned_kernel
+@part_kernel
 def predict_in_time(job, work, y0, x0, shape, vector, mixed):
     """work.predicted = the view at an earlier instant; ``mixed``: its mean with the synthesised view."""
     move(job, work, 3, y0, x0, shape, vector)

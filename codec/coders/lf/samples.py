@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ii_core.base.jit import part_kernel, stage_kernel, tuned_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from .arithmetic import bit_cost, code_bit, code_mixed, code_number, number_cost
 from .coefficients import MOST_LEVEL
@@ -64,7 +64,7 @@ def _sign_context(planes, plane, y, x):
     return SAMPLE_SIGN + plane * 3 + (0 if first == 0 else (1 if first > 0 else 2))
 
 
-@tuned_kernel
+@part_kernel
 def code_samples(coder, levels, planes, y0, x0, plane, shape):
     """Write or read levels[:h, :w]; a reader finds only zeros there before.
 

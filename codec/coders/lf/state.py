@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.base.jit import stage_kernel, tuned_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from . import motion
 from .transform import LARGEST, sides
@@ -148,7 +148,7 @@ def zeros(shape: tuple[int, ...], dtype: Any = np.int16) -> tuple[NDArray[Any], 
     return np.frombuffer(memory, dtype).reshape(shape), memory
 
 
-@tuned_kernel
+@part_kernel
 def neighbours(blocks, field, value, by, bx):
     """Return the number of blocks above and to the left that have a value."""
     count = 0
@@ -159,7 +159,7 @@ def neighbours(blocks, field, value, by, bx):
     return count
 
 
-@tuned_kernel
+@part_kernel
 def doubt_class(job, by, bx, shape):
     """0–3 by how far the synthesis' sources differ in the block, in steps of the quantiser; 0 without synthesis."""
     if not job.synthesised:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import part_kernel, stage_kernel, tuned_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 LARGEST = 32
 _SIZES = 6  # by their binary logarithm
@@ -88,7 +88,7 @@ def forward(block, shape, half, out, kind):
     _product(half, TRANSPOSED[kind >> 1, shape[1]], h, w, w, 2048, 12, out)
 
 
-@tuned_kernel
+@part_kernel
 def inverse(coefficients, shape, rows, cols, half, out, kind):
     """out[:h, :w] = the inverse transform of coefficients that are zero but for the first rows and columns."""
     h, w = sides(shape)

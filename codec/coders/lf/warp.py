@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import stage_kernel, tuned_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from .transform import LARGEST
 
@@ -104,7 +104,7 @@ def _add_four(out, at, one, two, three, four):
     out[at], out[at + 1], out[at + 2], out[at + 3] = one, two, three, four
 
 
-@tuned_kernel
+@part_kernel
 def moved_block(views, view, plane, y0, x0, h, w, dy, dx, rows, out):
     """out[plane, :h, :w] += 64² times the block at (y0 + dy, x0 + dx) of a plane; ``rows`` is (38, 40) for use.
 
