@@ -1,5 +1,6 @@
 """Fixtures that several test files share; markers of tests."""
 
+import gc
 import os
 import sys
 
@@ -13,6 +14,8 @@ from tests.support.browser import browser, show, show_once  # noqa: F401
 # The first call of a kernel compiles it, which would exceed any deadline. CI uses the same examples every time.
 settings.register_profile("here", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("here")
+
+gc.set_threshold(20_000, 10, 10)  # Python's 700 takes 6 % of the time of all tests
 
 
 def pytest_addoption(parser):

@@ -9,6 +9,7 @@ import threading
 import tomllib
 from pathlib import Path
 
+import numba
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -136,12 +137,9 @@ def test_a_kernel_keeps_its_rounding_and_its_size_whoever_calls_it():
     assert not compiled.fndesc.inline
 
 
-def test_garbage_is_looked_for_less_often_while_numba_compiles_alone():
-    before, during = gc.get_threshold(), []
-
-    @jit.kernel
-    def doubled(x):
-        return 2 * x
+@pytest.mark.parametrize("before", [(700, 10, 10), (0, 10, 10), (100_000, 5, 5)])
+def test_garbage_is_looked_for_less_often_while_numba_compiles_alone(before):
+    usual, during = gc.get_threshold(), []
 
     class Listener(event.Listener):
         def on_start(self, event):
@@ -150,6 +148,11 @@ def test_garbage_is_looked_for_less_often_while_numba_compiles_alone():
         def on_end(self, event):
             pass
 
-    with event.install_listener("numba:compile", Listener()):
-        doubled(1)
-    assert during[0][0] > before[0] and gc.get_threshold() == before
+    gc.set_threshold(*before)
+    try:
+        with event.install_listener("numba:compile", Listener()):
+            numba.njit(lambda x: 2 * x)(1)
+        assert gc.get_threshold() == before
+    finally:
+        gc.set_threshold(*usual)
+    assert during[0][0] == (max(before[0], 20_000) if before[0] else 0)

@@ -290,7 +290,7 @@ def test_same_bits_for_all_workers_tiles_and_rows(monkeypatch, samples):
     monkeypatch.setattr(Raster, "faces", lambda self, *rows: found.append(rows) or faces(self, *rows))
     whole = render(scene, camera, workers=1, samples=samples)
     assert len(found) == 2 * samples
-    for workers, rays in ((3, 65536), (2, 50), (2, 3000), (1, 10**6)):
+    for workers, rays in ((3, 65536), (2, 500), (2, 3000), (1, 10**6)):
         monkeypatch.setattr(job, "TILE_RAYS", rays)
         again = render(scene, camera, workers=workers, samples=samples)
         for name in ("depth", "normal", "object_id"):
