@@ -353,10 +353,19 @@ def _git(*arguments: str) -> subprocess.CompletedProcess[str]:
 def exists(commit: str) -> bool:
     """Return whether a commit is an ancestor of HEAD; True without a history. Commits of rebased branches are not."""
     try:
-        shallow = _git("rev-parse", "--is-shallow-repository")
-        return shallow.stdout.strip() != "false" or not _git("merge-base", "--is-ancestor", commit, "HEAD").returncode
+        before = _ancestors()
+        return (
+            before is None or commit in before or not _git("merge-base", "--is-ancestor", commit, "HEAD").returncode
+        )
     except (OSError, subprocess.SubprocessError):
         return True
+
+
+@lru_cache
+def _ancestors() -> set[str] | None:
+    """Return the commits before HEAD, read once; None if the history is not whole."""
+    shallow = _git("rev-parse", "--is-shallow-repository").stdout.strip() != "false"
+    return None if shallow else set(_git("rev-list", "HEAD").stdout.split())
 
 
 def seconds_in(value: Any) -> Iterable[float]:

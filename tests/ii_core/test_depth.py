@@ -26,6 +26,7 @@ from ii_core.depth.estimate import (
 )
 from ii_core.depth.points import view_points
 from ii_core.picture.assumed import with_assumed_camera
+from tests.support.slow import first_fast
 
 RNG = np.random.default_rng(3)
 WAVES = RNG.uniform(-0.9, 0.9, (24, 2)), RNG.uniform(0, 6.3, (24, 3)), RNG.uniform(0.3, 1, 24)
@@ -97,7 +98,7 @@ def disc(front, back, size=(72, 60), views=7, radius=17.0):
     return IIPicture(codes.reshape(l * views, k * views, 3), size, (views, views)), true
 
 
-@pytest.mark.parametrize(("front", "back"), [(1.5, -0.5), (0.4, -0.4)])
+@pytest.mark.parametrize(("front", "back"), first_fast([(1.5, -0.5), (0.4, -0.4)]))
 def test_only_the_outermost_pixels_of_a_body_may_be_lost(front, back):
     picture, truth = disc(front, back)
     found = estimate_depth(picture)

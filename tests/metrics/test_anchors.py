@@ -67,7 +67,7 @@ def picture():
     return IIPicture(pixels, (71, 66), (2, 2))
 
 
-SLOW = ("vvenc", "libaom", "libaom-chroma", "svtav1", "x265-420")
+SLOW = ("vvenc", "libaom", "libaom-chroma", "svtav1", "x265", "x265-420", "jpegxl")
 
 
 @pytest.mark.parametrize(

@@ -282,7 +282,7 @@ def test_a_camera_in_any_pose_and_type_of_pixel(monkeypatch):
     assert len(np.unique(ours.picture.pixels)) > 100
 
 
-@pytest.mark.parametrize("samples", [1, 3])
+@pytest.mark.parametrize("samples", first_fast([1, 3]))
 def test_same_bits_for_all_workers_tiles_and_rows(monkeypatch, samples):
     scene, camera = hall(), preset("setup1", scale=16)
     found = []

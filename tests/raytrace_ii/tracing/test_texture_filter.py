@@ -182,6 +182,7 @@ def test_scenes_without_images_do_not_change():
     np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.slow
 def test_meridians_of_a_sky_are_grey_where_they_meet():
     """Stripes of 2° by longitude are 0.35° wide at an elevation of 80°, where a pixel of 2.9° sees eight of them."""
     camera = IICamera(pixels=(12, 8), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0)
