@@ -127,10 +127,11 @@ class IIPicture:
 
     def check_regular(self) -> None:
         """Raise ValueError unless the structure is regular."""
-        if not self.regular:
-            u, v = self.ei_pixels
+        if self.camera is not None and not self.camera.regular:
+            (u, v), (x, y) = self.ei_pixels, self.camera.lens_lattice.origin
+            beginning = f" that begin at {x:.5g}, {y:.5g} px" if (x, y) != (0, 0) else ""
             raise ValueError(
-                f"the structure is not regular, elementary images of {u:.5g}×{v:.5g} px: "
+                f"the structure is not regular, elementary images of {u:.5g}×{v:.5g} px{beginning}: "
                 "run `raytrace-ii regular`, or ii_core.resampled"
             )
 

@@ -50,6 +50,7 @@ class QuiltPlan:
         """Return the arguments of `ii_core.display.quilt.quilt` beside the tiles for a picture with its camera."""
         from ii_core.display.quilt import cone_share, shown_shares
 
+        picture.check_regular()
         cone = 0.9 if self.given_cone is None else self.given_cone
         if self.device is not None and self.given_cone is None:
             cone = cone_share(picture, self.device.cone_deg)

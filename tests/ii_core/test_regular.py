@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from ii_core import IICamera, IIPicture, component_images, preset, view_image
+from ii_core import IICamera, IIPicture, component_images, preset, preset_cameras, view_image
 from ii_core.picture.regular import from_smallest_rectangle, owners, resampled, smallest_rectangle
 from tests.support.slow import first_fast
 
@@ -319,6 +319,9 @@ def test_wrong_calls_are_refused():
         resampled(picture, (4.5, 4))
     with pytest.raises(ValueError, match="structure is not regular"):
         from_smallest_rectangle(picture, camera)
+    moved = preset_cameras("moving-lenslets", scale=16)[1]
+    with pytest.raises(ValueError, match=r"images of 16×16 px that begin at 4, -4 px: run"):
+        picture_of(moved).check_regular()
     other = camera_of("rectangular", (5.7, 4.6))
     with pytest.raises(ValueError, match=r"smallest rectangles are 7×6 of 6×5 px, the picture has 7×6 of 5×5"):
         from_smallest_rectangle(smallest_rectangle(picture)[0], other)
