@@ -63,9 +63,11 @@ def load_any(path: Path) -> IIPicture:
 
     if path.suffix.lower() in IMAGE_TYPES:
         return IIPicture.load(path)
-    from codec import decode
+    from codec import decode, is_take
 
     check_file(path)
+    if is_take(path):
+        raise ValueError(f"{path} is a take: raytrace-ii decode makes pictures of its frames")
     try:
         return decode(path)
     except ValueError as error:

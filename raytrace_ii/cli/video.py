@@ -87,12 +87,14 @@ def video(
 
 
 def is_take_source(path: Path) -> bool:
-    """Return whether a path is an II-video: a folder, a coded take or a film."""
-    if path.suffix == ".ii" and path.is_file():
-        from codec import is_take
+    """Return whether a path is an II-video: a folder, a film, or a coded take by any name."""
+    from ii_core.base.files import IMAGE_TYPES
 
-        return is_take(path)
-    return path.is_dir() or path.suffix.lower() in FILMS
+    if path.suffix.lower() in (*IMAGE_TYPES, *FILMS) or not path.is_file():
+        return path.is_dir() or path.suffix.lower() in FILMS
+    from codec import is_take
+
+    return is_take(path)
 
 
 def compared_takes(source: Path, compare: Path | None) -> tuple[IIVideo, IIVideo | None, dict[str, Any]]:
@@ -136,19 +138,18 @@ def opened(source: Path, fps: float | None = None) -> IIVideo:
     """Open a folder, a coded take or a quilt video as II-video."""
     from ii_core import open_video
 
-    if source.suffix == ".ii":
-        from codec import open_take
-        from ii_core.base.files import check_file
+    if source.suffix != ".ii" and (source.is_dir() or not is_take_source(source)):
+        return open_video(source, fps=fps)
+    from ii_core.base.files import check_file
 
-        check_file(source)
-        return _at(open_take(source), fps)
+    check_file(source)
     if source.suffix.lower() in FILMS:
-        from ii_core.base.files import check_file
         from ii_core.display.video import open_quilt_video
 
-        check_file(source)
         return _at(open_quilt_video(source), fps)
-    return open_video(source, fps=fps)
+    from codec import open_take
+
+    return _at(open_take(source), fps)
 
 
 def _at(video: IIVideo, fps: float | None) -> IIVideo:

@@ -528,6 +528,14 @@ def test_a_refused_command_leaves_nothing(run, refused, files, monkeypatch, comm
     assert {*files.rglob("*")} == before
 
 
+def test_a_coded_take_is_one_by_any_name(run, refused, files, tmp_path):
+    coded = tmp_path / "take.coded"
+    coded.write_bytes((files / "t.ii").read_bytes())
+    assert run("video", coded, "--to", "frames", "-o", tmp_path / "frames")[0] == 0
+    assert "Q_global" in run("measure", tmp_path / "frames", coded)[1]
+    refused(run("look", coded, "-o", tmp_path / "view.png"), "is a take: raytrace-ii decode")
+
+
 def test_an_existing_folder_is_kept(run, refused, files, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
