@@ -508,7 +508,7 @@ def files(tmp_path_factory):
         (("components", "hex.png", "-o", "out/si"), "is not regular"),
         (("export", "hex.png", "--to", "views", "-o", "out/views"), "is not regular"),
         (("export", "hex.png", "--to", "hci", "-o", "out/hci"), "is not regular"),
-        (("display", "hex.png", "--as", "quilt", "-o", "q.png"), "is not regular"),
+        (("display", "hex.png", "--as", "quilt", "--size", "64x8", "-o", "q.png"), "is not regular"),
         (("measure", "p.png", "none.png", "--plots", "out/plots"), "none.png does not exist"),
         (("measure", "take", "none", "--plots", "out/plots"), "none is no folder of frames"),
         ((*STUDY, "--rates", "-1"), "positive rates are needed"),
