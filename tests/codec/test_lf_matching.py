@@ -1,9 +1,11 @@
-"""Encoder search of disparity in `si-lf`: table of inner products, and table of bit costs."""
+"""Disparity in `si-lf`: the encoder's table of inner products, table of bit costs, and comparison of sources."""
 
 import numpy as np
 import pytest
 
-from codec.coders.lf import arithmetic, contexts
+from codec.coders.lf import arithmetic, contexts, synthesis
+from codec.coders.lf.agreement import new_matching
+from codec.coders.lf.kinds import DIFFERENT
 from codec.coders.lf.matching import CELLS, fill_products, new_match
 from codec.coders.lf.state import UNKNOWN, Job, new_blocks
 from codec.coders.lf.stream import UPRIGHT
@@ -106,3 +108,108 @@ def test_costs_are_those_of_the_coder():
         predicted += float(costs[context, int(bit)])
     # The coder ends on whole bytes; the table has 4096 probabilities.
     assert 8 * len(arithmetic.finish(coder)) == pytest.approx(predicted, rel=0.002, abs=48)
+
+
+def _sources(rng, count, shifted, shape):
+    """Views around view 0: index, how far across and down, and shifts by square as `rig.departing` gives them."""
+    places = np.array([[1, -1000, 90], [2, 1100, -60], [3, 30, 1024], [4, 2048, -2048]])[:count]
+    if not shifted:
+        return places
+    squares = -(-shape[0] // 32) * -(-shape[1] // 32)
+    return np.hstack([places, rng.integers(-300, 300, (count, 2 * squares))])
+
+
+def _led(source, y, x, d, shape):
+    """How far a disparity leads to a source, in 2^-8 samples, as docs/lf.md has it."""
+    across, down = (d * source[1]) >> 10, (d * source[2]) >> 10
+    if len(source) > 3:
+        row, col = min(max(y, 0), shape[0] - 1) // 32, min(max(x, 0), shape[1] - 1) // 32
+        at = 3 + 2 * (row * -(-shape[1] // 32) + col)
+        across, down = across + source[at], down + source[at + 1]
+    return down, across
+
+
+def _between(plane, y, x):
+    """A plane's sample at a position in 2^-8 samples, bilinearly by sixteenths, its border repeated."""
+    (py, px), (height, width) = ((y >> 4) & 15, (x >> 4) & 15), plane.shape
+    rows, cols = (np.clip([k >> 8, (k >> 8) + 1], 0, n - 1) for k, n in ((y, height), (x, width)))
+    four = plane[np.ix_(rows, cols)].astype(int)
+    return int(np.array([16 - py, py]) @ four @ np.array([16 - px, px])) >> 8
+
+
+def _sees(y, x, shape):
+    return -128 <= y <= 256 * shape[0] - 128 and -128 <= x <= 256 * shape[1] - 128
+
+
+def _apart(views, sources, y, x, d):
+    """How far the samples of the sources are from the one most like the others."""
+    shape, values = views.shape[2:], []
+    for source in sources:
+        dy, dx = _led(source, y, x, d, shape)
+        if _sees(256 * y + dy, 256 * x + dx, shape):
+            values.append(_between(views[source[0], 0], 256 * y + dy, 256 * x + dx))
+    if len(values) < 2:
+        return 176
+    least = min(sum(min(abs(a - b), 320) for b in values) for a in values)
+    return least // (len(values) - 1) + 16 * (len(sources) - len(values))
+
+
+def _disagreement(views, disparities, sources, y, x, d):
+    """Sixth of the sum over a cross, its middle twice, and more, the fewer sources say the same of themselves."""
+    cross = (0, 0), (0, 0), (0, 1), (0, -1), (1, 0), (-1, 0)
+    total = sum(_apart(views, sources, y + j, x + i, d) for j, i in cross)
+    agreeing, shape = 0, views.shape[2:]
+    for source in sources:
+        dy, dx = _led(source, y, x, d, shape)
+        j, i = y + ((dy + 128) >> 8), x + ((dx + 128) >> 8)
+        if 0 <= j < shape[0] and 0 <= i < shape[1] and disparities[source[0], j, i] != UNKNOWN:
+            far = max(abs(source[1]), abs(source[2])) / 1024
+            agreeing += abs(int(disparities[source[0], j, i]) - d) * far < DIFFERENT
+    return total // 6 + (64, 32, 16, 10, 8)[agreeing]
+
+
+def _mismatch(views, sources, y, x, d):
+    """Sum of the two sources that differ least from view 0 over 3×3 samples."""
+    (height, width), sums = views.shape[2:], []
+    for source in sources:
+        dy, dx = _led(source, y, x, d, (height, width))
+        if not (-1 <= x + (dx >> 8) <= width and -1 <= y + (dy >> 8) <= height):
+            sums.append(9 * 176)
+            continue
+        total = 0
+        for j in range(max(y - 1, 0), min(y + 2, height)):
+            for i in range(max(x - 1, 0), min(x + 2, width)):
+                there = _between(views[source[0], 0], 256 * j + dy, 256 * i + dx)
+                total += min(abs(there - int(views[0, 0, j, i])), 320)
+        sums.append(total)
+    return sum(sorted(sums)[:2]) if len(sums) > 1 else 2 * sums[0]
+
+
+@pytest.mark.parametrize(("count", "shifted"), [(4, False), (4, True), (3, False), (1, False)])
+def test_samples_compared_together_differ_as_one_by_one(count, shifted):
+    rng = np.random.default_rng(count + 10 * shifted)
+    views = rng.integers(-900, 900, (5, 3, 68, 44)).astype(np.int16)
+    disparities = rng.integers(-500, 500, (5, 68, 44)).astype(np.int16)  # so many are kept from all over the view
+    disparities[rng.random(disparities.shape) < 0.1] = UNKNOWN
+    sources = _sources(rng, count, shifted, views.shape[2:])
+    made, matching = synthesis.new_synthesis(views, disparities, sources), new_matching(68, 44)
+    synthesis.synthesise(made, matching, 16)
+    for y, x, d, found in _kept(rng, matching, 44):
+        assert found == _disagreement(views, disparities, sources, y, x, d), (y, x, d)
+    synthesis.refine(made, matching, 0)
+    kept = _kept(rng, matching, 44)
+    for y, x, d, found in kept:
+        assert found == _mismatch(views, sources, y, x, d), (y, x, d)
+    assert min(len({row[k] for row in kept}) for k in range(3)) > 3
+
+
+def _kept(rng, matching, width):
+    """What is kept, some of it: row, column, disparity and cost."""
+    found = []
+    for place in rng.permutation(np.flatnonzero(matching.marks >= 0))[:60]:
+        mark = int(matching.marks[place])
+        y, across = divmod(mark >> 16, width)
+        i = int(rng.integers(16))
+        if 16 * across + i < width:
+            found.append((y, 16 * across + i, (mark + 32768) % 65536 - 32768, int(matching.kept[place, i])))
+    return found

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import loop_filter, motion, rig, synthesis
+from .agreement import new_matching
 from .arithmetic import Arithmetic
 from .blocks import MOST_HALVINGS, MOST_INDEX, code_view
 from .exact import code_exact, new_exact, prepare
@@ -79,7 +80,7 @@ class Field:
         references, sources = (self._offsets(node, places) for places in (node.references, node.sources))
         unit = self._unit(references)
         made = new_synthesis(self.views, self.disparities, sources)
-        known = len(sources) > 1 and synthesis.synthesise(made, self._unit(sources))
+        known = len(sources) > 1 and synthesis.synthesise(made, new_matching(*self.shape), self._unit(sources))
         made = chosen(made)
         job = Job(
             views=self.views,
@@ -150,8 +151,7 @@ class Field:
             known = np.stack([field.disparities[job.at] for field in self.past])
             motion.carry(job, known, self.disparities[job.at])
         if len(made.sources):
-            synthesis.refine(made, job.at, False)
-            synthesis.refine(made, job.at, True)
+            synthesis.refine(made, new_matching(*self.shape, told=False), job.at)
 
     def finish(self, nodes: list[Node]) -> None:
         """Count a batch as decoded."""
@@ -181,10 +181,10 @@ class Field:
         others = [(other.row, other.col) for other in self.levels[1] if self.decoded[other.row, other.col]]
         made = new_synthesis(self.views, self.disparities, self._offsets(node, tuple(others[:4])))
         at = self.number((node.row, node.col))
-        if synthesis.synthesise(made, self._unit(made.sources)):
+        matching = new_matching(*self.shape)
+        if synthesis.synthesise(made, matching, self._unit(made.sources)):
             self.disparities[at] = made.disparity
-            synthesis.refine(made, at, False)
-            synthesis.refine(made, at, True)
+            synthesis.refine(made, matching, at)
 
     def _offsets(self, node: Node, places: tuple[Place, ...]) -> np.ndarray:
         row, col, (across, down, apart) = node.row, node.col, self.header.lattice

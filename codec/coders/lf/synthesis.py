@@ -13,16 +13,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import array_kernel, lean_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import lane_kernel, lane_part, lane_stage, lean_kernel, part_kernel, stage_kernel
 
-from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, disagreement, hashed
+from .agreement import MATCHED, TRUNCATED, disagreement, forget, hashed, mismatch, prepare, reach, widen
 from .state import EXPLICIT, INDEX, KIND, UNKNOWN, zeros
 from .transform import LARGEST
-from .warp import BEFORE, FILTERS, LATTICE, TAPS, clamped, filtered, led
+from .warp import BEFORE, FILTERS, LATTICE, TAPS, clamped, led, weighed
 
 CANDIDATES = 8
 MOST_SOURCES = 8
 RUN = LARGEST  # samples of a row that are blended together: all within a square, for squares have shifts
+VECTOR = 16  # samples of a row that are interpolated together
 MET = 64  # disparities around a sample that are known to have been looked at
 SMOOTH = 8  # cost of a step of disparity
 
@@ -47,7 +48,7 @@ class Synthesis(NamedTuple):
         `UNKNOWN` where nothing is known.
     sources : ndarray of int64, (S, 3)
         Views to take from, the nearest first: index, how far in columns and in rows, in 2^-10 of a view.
-    candidates : ndarray of int16, (CANDIDATES, H, W)
+    candidates : ndarray of int16, (H, W, CANDIDATES)
     counts : ndarray of uint8, (H, W)
     made : ndarray of int16, (3, H, W)
     disparity : ndarray of int16, (H, W)
@@ -55,12 +56,7 @@ class Synthesis(NamedTuple):
         Mean difference of a source from the one most like the others.
     scratch : ndarray of int64, (10, MOST_SOURCES)
     tried : ndarray of int64, (16,)
-    span : ndarray of int32, (MATCHED, SPAN)
-    kept : ndarray of int16, (ROWS · W / SPAN · SLOTS, SPAN)
-        How far the sources differ, by row, position and disparity.
-    marks : ndarray of int64, (ROWS · W / SPAN · SLOTS,)
-        Row and disparity of what is kept.
-    taken : ndarray of int32, (MOST_SOURCES + 1, 3, RUN + 4)
+    taken : ndarray of int32, (MOST_SOURCES + 1, 3, RUN + VECTOR)
         Samples of the sources for those that are blended together, the last of the source most like the others,
     weights, totals : ndarray of int32, (MOST_SOURCES, RUN)
         their weights, and how far each is from the others,
@@ -70,9 +66,11 @@ class Synthesis(NamedTuple):
         and sums of samples.
     near : ndarray of int64, (MOST_SOURCES,)
         Squared distance from the nearest sample of each source, in units of 1/64.
-    sums : ndarray of int32, (RUN + TAPS + 3,)
+    sums : ndarray of int32, (2 VECTOR + TAPS,)
     met : ndarray of int64, (MET,)
-        Samples and disparities that were looked at.
+        Samples and disparities that were looked at,
+    fresh : ndarray of int64, (9 * CANDIDATES + 1,)
+        and disparities of a sample that were not.
     """
 
     views: Any
@@ -85,9 +83,6 @@ class Synthesis(NamedTuple):
     doubt: Any
     scratch: Any
     tried: Any
-    span: Any
-    kept: Any
-    marks: Any
     taken: Any
     weights: Any
     totals: Any
@@ -96,6 +91,7 @@ class Synthesis(NamedTuple):
     near: Any
     sums: Any
     met: Any
+    fresh: Any
 
 
 def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
@@ -105,40 +101,38 @@ def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
         views=views,
         disparities=disparities,
         sources=sources,
-        candidates=zeros((CANDIDATES, height, width))[0],
+        candidates=zeros((height, width, CANDIDATES))[0],
         counts=zeros((height, width), np.uint8)[0],
         made=zeros((3, height, width))[0],
         disparity=zeros((height, width))[0],
         doubt=np.zeros((height // 4, width // 4), np.int16),
         scratch=np.zeros((10, MOST_SOURCES), np.int64),
         tried=np.zeros(16, np.int64),
-        span=np.zeros((MATCHED, SPAN), np.int32),
-        kept=np.zeros((ROWS * -(-width // SPAN) * SLOTS, SPAN), np.int16),
-        marks=np.full(ROWS * -(-width // SPAN) * SLOTS, -1),
-        taken=np.zeros((MOST_SOURCES + 1, 3, RUN + 4), np.int32),
+        taken=np.zeros((MOST_SOURCES + 1, 3, RUN + VECTOR), np.int32),
         weights=np.zeros((MOST_SOURCES, RUN), np.int32),
         totals=np.zeros((MOST_SOURCES, RUN), np.int32),
         found=np.zeros((4, RUN), np.int32),
         blended=np.zeros((3, RUN)),
         near=np.zeros(MOST_SOURCES, np.int64),
-        sums=np.zeros(RUN + TAPS + 3, np.int32),
+        sums=np.zeros(2 * VECTOR + TAPS, np.int32),
         met=np.full(MET, -1),
+        fresh=np.zeros(9 * CANDIDATES + 1, np.int64),
     )
 
 
 def chosen(s: Synthesis) -> Synthesis:
-    """Return it without the room that only the choice of disparity takes, half of all."""
-    return s._replace(candidates=s.candidates[:0].copy(), kept=s.kept[:0].copy(), marks=s.marks[:0].copy())
+    """Return it without the room that only the choice of disparity takes, most of all."""
+    return s._replace(candidates=s.candidates[:0].copy())
 
 
 @stage_kernel
 def _insert(s, y, x, d, apart):
     count = np.int64(s.counts[y, x])
     for i in range(count):
-        if abs(s.candidates[i, y, x] - d) <= apart:
+        if abs(s.candidates[np.uint64(y), np.uint64(x), np.uint64(i)] - d) <= apart:
             return
     if count < CANDIDATES:
-        s.candidates[count, y, x] = d
+        s.candidates[np.uint64(y), np.uint64(x), np.uint64(count)] = d
         s.counts[y, x] = count + 1
 
 
@@ -163,53 +157,55 @@ def project(s, apart):
 
 
 @part_kernel
-def choose(s, apart):
+def choose(s, m, apart):
     """s.disparity = of the candidates around each sample the one on which the sources agree best."""
     height, width = s.counts.shape
-    tried = s.tried
     for y in range(height):
         for x in range(width):
-            number = 0
-            for j in range(max(y - 1, 0), min(y + 2, height)):
-                for i in range(max(x - 1, 0), min(x + 2, width)):
-                    for c in range(s.counts[np.uint64(j), np.uint64(i)]):
-                        d = np.int64(s.candidates[np.uint64(c), np.uint64(j), np.uint64(i)])
-                        mark, place = ((y * width + x) << 16) | (d & 0xFFFF), np.uint64(hashed(d) & (MET - 1))
-                        if s.met[place] == mark:
-                            continue
-                        s.met[place], new = mark, True
-                        for k in range(number):
-                            if abs(tried[k] - d) <= apart:
-                                new = False
-                                break
-                        if new and number < tried.size:
-                            tried[np.uint64(number)] = d
-                            number += 1
-            left = np.int64(s.disparity[y, x - 1]) if x > 0 else np.int64(UNKNOWN)
-            best = _best_tried(s, y, x, number, left) if number > 1 else (tried[0] if number else np.int64(UNKNOWN))
+            number = _try_around(s, y, x, apart)
+            best = _best_tried(s, m, y, x, number) if number > 1 else (s.tried[0] if number else np.int64(UNKNOWN))
             s.disparity[y, x] = best
     _fill(s.disparity)
 
 
 @stage_kernel
-def _best_tried(s, y, x, number, left):
-    """Of the first disparities tried, the one on which the sources agree best, and the first of equals.
+def _try_around(s, y, x, apart):
+    """s.tried = different candidates around a sample; return their number.
 
-    That of the sample to the left is looked at first: it is often best, and of others less is then computed.
+    Each is written to the end of the list, which grows if it is new: branches would be hard to foresee.
     """
-    best: Any = np.int64(0)
-    tried = s.tried
+    height, width = s.counts.shape
+    tried, number, found = s.tried, 0, 0
+    for j in range(max(y - 1, 0), min(y + 2, height)):
+        for i in range(max(x - 1, 0), min(x + 2, width)):
+            for c in range(s.counts[np.uint64(j), np.uint64(i)]):
+                d = np.int64(s.candidates[np.uint64(j), np.uint64(i), np.uint64(c)])
+                mark, place = ((y * width + x) << 16) | (d & 0xFFFF), np.uint64(hashed(d) & (MET - 1))
+                s.fresh[np.uint64(found)] = d
+                found += 1 if s.met[place] != mark else 0
+                s.met[place] = mark
+    for c in range(found):
+        d, new = s.fresh[np.uint64(c)], True
+        for k in range(number):
+            if abs(tried[k] - d) <= apart:
+                new = False
+                break
+        if new and number < tried.size:
+            tried[np.uint64(number)] = d
+            number += 1
+    return number
+
+
+@stage_kernel
+def _best_tried(s, m, y, x, number):
+    """Of the first disparities tried, the one on which the sources agree best, and the first of equals."""
+    best, least = np.int64(0), np.int64(1 << 40)
     for k in range(number):
-        if tried[k] == left:
-            best = k
-    start, least = best, disagreement(s, y, x, tried[np.uint64(best)], np.int64(1 << 40))
-    for k in range(number):
-        if k != start:
-            earlier = 1 if k < best else 0
-            cost = disagreement(s, y, x, tried[k], least + earlier)
-            if cost < least + earlier:
-                least, best = cost, k
-    return tried[np.uint64(best)]
+        d = s.tried[np.uint64(k)]
+        cost = disagreement(s, m, y, x, d)
+        if cost < least:
+            best, least = d, cost
+    return best
 
 
 @part_kernel
@@ -230,7 +226,7 @@ def _fill(disparity):
                 disparity[y, x] = disparity[y + 1, x]
 
 
-@lean_kernel
+@lane_kernel
 def blend(s, nearest, every):
     """s.made = the sources' samples along s.disparity, those left out that see something else.
 
@@ -260,8 +256,9 @@ def blend(s, nearest, every):
 
 @stage_kernel
 def _weigh_sources(s, nearest):
-    """s.scratch[6:9] = weights of each source where it agrees, does not, and does not see the sample."""
+    """s.scratch[6:9] = weights of a source that agrees, does not, and does not see the sample; [9] = its `reach`."""
     for r in range(s.sources.shape[0]):
+        s.scratch[9, r] = reach(s.sources, r)
         squared = s.sources[r, 1] * s.sources[r, 1] + s.sources[r, 2] * s.sources[r, 2]
         far = 8 + (squared >> 2 * LATTICE)
         for kind, weight in enumerate((64, 8, 1)):
@@ -277,14 +274,18 @@ def _take_run(s, y, x, length, d, nearest, place):
         view = s.sources[r, 0]
         dy, dx = led(s.sources, r, d, y, x, s.counts.shape)
         agreeing, other, unseen = s.scratch[6, r], s.scratch[7, r], s.scratch[8, r]
-        inside = -128 <= 256 * y + dy <= 256 * height - 128
+        i, j = x + ((dx + 128) >> 8), y + ((dy + 128) >> 8)
+        told, known = s.disparities[view, np.uint64(clamped(j, height))], 0 <= j < height
+        inside, most = -128 <= 256 * y + dy <= 256 * height - 128, s.scratch[9, r]
         for k in range(length):
             at, weight = 256 * (x + k) + dx, unseen
             if inside and -128 <= at <= 256 * width - 128:
-                weight = agreeing if agrees(s, r, y, x + k, d) else other
+                weight = other
+                if known and 0 <= i + k < width:
+                    own = np.int64(told[np.uint64(i + k)])
+                    weight = agreeing if own != UNKNOWN and abs(own - d) <= most else other
             s.weights[r, np.uint64(place + k)] = weight
         if nearest:
-            i, j = x + ((dx + 128) >> 8), y + ((dy + 128) >> 8)
             fx, fy = ((dx + 128) & 255) - 128, ((dy + 128) & 255) - 128
             s.near[r] = min((fx * fx + fy * fy) >> 10, 64)
             for p in range(3):
@@ -293,8 +294,7 @@ def _take_run(s, y, x, length, d, nearest, place):
                     s.taken[r, p, np.uint64(place + k)] = row[np.uint64(clamped(i + k, width))]
         else:
             ix, iy, px, py = x + (dx >> 8), y + (dy >> 8), (dx >> 4) & 15, (dy >> 4) & 15
-            for p in range(3):
-                _six_taps_run(s.views[view, p], iy, ix, py, px, length, s.sums, s.taken[r, p, place:])
+            _six_taps_run(s.views[view], iy, ix, py, px, length, s.sums, s.taken[r], place)
     if nearest:
         for k in range(place, place + length):
             most, closest = np.int64(-1), np.int64(64)
@@ -307,56 +307,50 @@ def _take_run(s, y, x, length, d, nearest, place):
                 s.weights[r, k] *= PHASE[max(s.near[r] - closest, 0)]
 
 
-@part_kernel
-def _six_taps_run(plane, iy, ix, py, px, count, sums, out):
-    """out[:count] = samples of a plane that follow each other, by six taps down, into ``sums``, then across.
+@lane_part
+def _six_taps_run(planes, iy, ix, py, px, count, sums, out, place):
+    """out[:, place : place + count] = samples of a view's planes that follow each other.
 
-    Beyond its border the plane goes on with the border's samples.
+    By six taps down, into ``sums``, then across. Beyond its border a plane goes on with the border's samples. Places
+    of ``out`` beyond the last are written, too.
     """
+    width = planes.shape[2]
+    a, b, c = FILTERS[px, 0], FILTERS[px, 1], FILTERS[px, 2]
+    d, e, f = FILTERS[px, 3], FILTERS[px, 4], FILTERS[px, 5]
+    for first in range(0, count, VECTOR - TAPS + 1):
+        start, columns = ix - BEFORE + first, min(count - first, VECTOR - TAPS + 1) + TAPS - 1
+        inside = start >= 0 and start + columns <= width and width >= VECTOR
+        left = min(start, width - VECTOR) if inside else start
+        for p in range(3):
+            taken, into = sums[start - left :], out[p, place + first :]
+            _six_rows(planes[p], iy - BEFORE, left, py, columns, inside, sums)
+            if px:
+                for j in range(VECTOR):
+                    far, near, middle = taken[j], taken[j + 1], taken[j + 2]
+                    total = weighed(far, near, middle, taken[j + 3], taken[j + 4], taken[j + 5], a, b, c, d, e, f)
+                    into[j] = np.int32(total + np.int32(2048)) >> np.int32(12)
+            else:
+                for j in range(VECTOR):
+                    into[j] = np.int32(taken[j + BEFORE] + np.int32(32)) >> np.int32(6)
+
+
+@lane_stage
+def _six_rows(plane, top, left, phase, columns, inside, sums):
+    """sums[:columns] = weighted sums of six rows; not ``inside``: where the plane may have ended."""
     height, width = plane.shape
-    start, columns = ix - BEFORE, count + TAPS - 1
-    if start >= 0 and start + columns <= width:
-        if py:
-            _six_rows(plane, iy - BEFORE, start, py, columns, sums)
-        else:
-            row = plane[np.uint64(clamped(iy, height)), start : start + columns]
-            for j in range(columns):
-                sums[j] = np.int32(row[j]) * np.int32(64)
-    else:
-        for j in range(columns):
-            at, total = np.uint64(clamped(start + j, width)), np.int32(0)
-            for k in range(TAPS):
-                total += np.int32(FILTERS[py, k] * np.int32(plane[np.uint64(clamped(iy + k - BEFORE, height)), at]))
-            sums[j] = total
-    if px:
-        a, b, c = FILTERS[px, 0], FILTERS[px, 1], FILTERS[px, 2]
-        d, e, f = FILTERS[px, 3], FILTERS[px, 4], FILTERS[px, 5]
-        for j in range(count):
-            out[j] = np.int32(filtered(sums, j, a, b, c, d, e, f) + np.int32(2048)) >> np.int32(12)
-    else:
-        for j in range(count):
-            out[j] = np.int32(sums[j + BEFORE] + np.int32(32)) >> np.int32(6)
-
-
-@stage_kernel
-def _six_rows(plane, top, left, phase, columns, sums):
-    """sums[:columns] = weighted sums of six rows."""
-    height, right = plane.shape[0], left + columns
-    one, two = (
-        plane[np.uint64(clamped(top, height)), left:right],
-        plane[np.uint64(clamped(top + 1, height)), left:right],
-    )
-    three = plane[np.uint64(clamped(top + 2, height)), left:right]
-    four = plane[np.uint64(clamped(top + 3, height)), left:right]
-    five = plane[np.uint64(clamped(top + 4, height)), left:right]
-    six = plane[np.uint64(clamped(top + 5, height)), left:right]
+    one, two = plane[np.uint64(clamped(top, height))], plane[np.uint64(clamped(top + 1, height))]
+    three, four = plane[np.uint64(clamped(top + 2, height))], plane[np.uint64(clamped(top + 3, height))]
+    five, six = plane[np.uint64(clamped(top + 4, height))], plane[np.uint64(clamped(top + 5, height))]
     a, b, c = FILTERS[phase, 0], FILTERS[phase, 1], FILTERS[phase, 2]
     d, e, f = FILTERS[phase, 3], FILTERS[phase, 4], FILTERS[phase, 5]
-    for j in range(columns):
-        far = np.int32(np.int32(a * np.int32(one[j])) + np.int32(f * np.int32(six[j])))
-        near = np.int32(np.int32(b * np.int32(two[j])) + np.int32(e * np.int32(five[j])))
-        middle = np.int32(np.int32(c * np.int32(three[j])) + np.int32(d * np.int32(four[j])))
-        sums[j] = np.int32(np.int32(far + near) + middle)
+    if inside:
+        one, two, three, four, five, six = one[left:], two[left:], three[left:], four[left:], five[left:], six[left:]
+        for j in range(VECTOR):
+            sums[j] = weighed(one[j], two[j], three[j], four[j], five[j], six[j], a, b, c, d, e, f)
+    else:
+        for j in range(columns):
+            x = np.uint64(clamped(left + j, width))
+            sums[j] = weighed(one[x], two[x], three[x], four[x], five[x], six[x], a, b, c, d, e, f)
 
 
 @stage_kernel
@@ -428,52 +422,6 @@ def _store_run(s, y, first, count):
         s.doubt[y >> 2, np.uint64((first + k) >> 2)] += (apart + 8) >> 4
 
 
-@stage_kernel
-def _mismatch(s, at, y, x, d):
-    """Return the difference of the best two sources from the decoded view around a sample, in eighths of a code."""
-    height, width = s.counts.shape
-    count = min(s.sources.shape[0], MATCHED)
-    least: Any = np.int64(1 << 40)
-    second: Any = np.int64(1 << 40)
-    within = 0 < x < width - 1 and 0 < y < height - 1
-    for r in range(count):
-        total = np.int64(0)
-        dy, dx = led(s.sources, r, d, y, x, (height, width))
-        ix, iy, px, py = dx >> 8, dy >> 8, (dx >> 4) & 15, (dy >> 4) & 15
-        own, other = s.views[at, 0], s.views[s.sources[r, 0], 0]
-        if x + ix < -1 or y + iy < -1 or x + ix > width or y + iy > height:
-            total = np.int64(9 * LONELY)
-        elif within and 0 < x + ix < width - 2 and 0 < y + iy < height - 2:
-            a, b, c, e = (16 - px) * (16 - py), px * (16 - py), (16 - px) * py, px * py
-            for j in range(3):
-                mine = own[y + j - 1, x - 1 : x + 2]
-                upper = other[y + iy + j - 1, x + ix - 1 : x + ix + 3]
-                lower = other[y + iy + j, x + ix - 1 : x + ix + 3]
-                for i in range(3):
-                    value = (a * upper[i] + b * upper[i + 1] + c * lower[i] + e * lower[i + 1]) >> 8
-                    total += min(abs(value - np.int64(mine[i])), TRUNCATED)
-                if total >= second:
-                    break
-        else:
-            for j in range(max(y - 1, 0), min(y + 2, height)):
-                mine = own[np.uint64(j)]
-                upper = other[np.uint64(clamped(j + iy, height))]
-                lower = other[np.uint64(clamped(j + iy + 1, height))]
-                for i in range(max(x - 1, 0), min(x + 2, width)):
-                    left, right = np.uint64(clamped(i + ix, width)), np.uint64(clamped(i + ix + 1, width))
-                    above = np.int64(upper[left]) * (16 - px) + np.int64(upper[right]) * px
-                    below = np.int64(lower[left]) * (16 - px) + np.int64(lower[right]) * px
-                    value = (above * (16 - py) + below * py) >> 8
-                    total += min(abs(value - np.int64(mine[np.uint64(i)])), TRUNCATED)
-                if total >= second:
-                    break
-        if total < least:
-            least, second = total, least
-        elif total < second:
-            second = total
-    return least + second if count > 1 else 2 * least
-
-
 @lean_kernel
 def start(s, at, blocks, unit, synthesised):
     """s.disparities[at] = that of the explicit blocks, and of the synthesis elsewhere."""
@@ -489,9 +437,20 @@ def start(s, at, blocks, unit, synthesised):
                 s.disparities[at, y, x] = UNKNOWN
 
 
-@lean_kernel
-def refine(s, at, backward):
-    """Let each sample take over a neighbour's disparity that fits the decoded view better."""
+@lane_kernel
+def refine(s, m, at):
+    """Let each sample take over a neighbour's disparity that fits the decoded view better, forward and backward."""
+    forget(m)
+    for r in range(min(s.sources.shape[0], MATCHED)):
+        widen(m, r, s.views[s.sources[r, 0], 0])
+    widen(m, MATCHED, s.views[at, 0])
+    for backward in range(2):
+        _pass_on(s, m, at, backward)
+
+
+@part_kernel
+def _pass_on(s, m, at, backward):
+    """Let samples take over the disparity of the one before them, or above or below."""
     height, width = s.counts.shape
     step = -1 if backward else 1
     for a in range(height):
@@ -508,7 +467,7 @@ def refine(s, at, backward):
                 d = own if k == 0 else (one if k == 1 else two)
                 if d == UNKNOWN or (k > 0 and d == own) or (k == 2 and d == one):
                     continue
-                cost = _mismatch(s, at, y, x, d) + _roughness(d, one, two)
+                cost = mismatch(s, m, y, x, d) + _roughness(d, one, two)
                 if cost < least:
                     least, best = cost, d
             s.disparities[at, y, x] = best
@@ -519,9 +478,10 @@ def _roughness(d, one, two):
     return 9 * SMOOTH * ((1 if d != one else 0) + (1 if d != two else 0))
 
 
-@array_kernel
-def synthesise(s, apart):
+@lane_kernel
+def synthesise(s, m, apart):
     """Disparity of a view from its sources'; return whether any is known."""
     project(s, apart)
-    choose(s, apart)
+    prepare(m, s.views, s.disparities, s.sources)
+    choose(s, m, apart)
     return s.disparity[0, 0] != UNKNOWN

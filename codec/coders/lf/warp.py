@@ -14,6 +14,8 @@ from .transform import LARGEST
 
 UNIT = 256
 TAPS = 6
+NARROW = 16  # columns of a block that are computed at least
+_1, _2, _3, _4, _5 = (np.uint64(k) for k in range(1, 6))
 BEFORE = 2  # taps before the sample at or left of the position
 
 
@@ -66,12 +68,11 @@ def led(references, r, d, y, x, shape):
 
 
 @stage_kernel
-def filtered(t, at, a, b, c, d, e, f):
-    """Sum of six samples from t[at] on, weighted."""
-    far = np.int32(np.int32(a * t[np.uint64(at)]) + np.int32(f * t[np.uint64(at + 5)]))
-    near = np.int32(np.int32(b * t[np.uint64(at + 1)]) + np.int32(e * t[np.uint64(at + 4)]))
-    middle = np.int32(np.int32(c * t[np.uint64(at + 2)]) + np.int32(d * t[np.uint64(at + 3)]))
-    return np.int32(np.int32(far + near) + middle)
+def weighed(one, two, three, four, five, six, a, b, c, d, e, f):
+    """Sum of six samples, weighted."""
+    far = np.int32(np.int32(a * np.int32(one)) + np.int32(f * np.int32(six)))
+    near = np.int32(np.int32(b * np.int32(two)) + np.int32(e * np.int32(five)))
+    return np.int32(np.int32(far + near) + np.int32(np.int32(c * np.int32(three)) + np.int32(d * np.int32(four))))
 
 
 @stage_kernel
@@ -79,67 +80,45 @@ def _filter_row(t, at, n, phase, row):
     """row[:n] = samples between those of t, from t[at + BEFORE] on, in units of 2^-6."""
     a, b, c = FILTERS[phase, 0], FILTERS[phase, 1], FILTERS[phase, 2]
     d, e, f = FILTERS[phase, 3], FILTERS[phase, 4], FILTERS[phase, 5]
-    if n == 4:
-        one, two = filtered(t, at, a, b, c, d, e, f), filtered(t, at + 1, a, b, c, d, e, f)
-        three, four = filtered(t, at + 2, a, b, c, d, e, f), filtered(t, at + 3, a, b, c, d, e, f)
-        row[0], row[1], row[2], row[3] = one, two, three, four
-    else:
-        for j in range(n):
-            row[j] = filtered(t, at + j, a, b, c, d, e, f)
-
-
-@stage_kernel
-def _filtered_down(r, i, j, a, b, c, d, e, f):
-    """Sum of six samples below each other from r[i, j] on, weighted."""
-    far = np.int32(np.int32(a * r[i, j]) + np.int32(f * r[i + 5, j]))
-    near = np.int32(np.int32(b * r[i + 1, j]) + np.int32(e * r[i + 4, j]))
-    return np.int32(np.int32(far + near) + np.int32(np.int32(c * r[i + 2, j]) + np.int32(d * r[i + 3, j])))
-
-
-@stage_kernel
-def _add_four(out, at, one, two, three, four):
-    """out[at … at + 3] += four numbers: computed before any is stored, they are vectorised."""
-    one, two = np.int32(out[at] + one), np.int32(out[at + 1] + two)
-    three, four = np.int32(out[at + 2] + three), np.int32(out[at + 3] + four)
-    out[at], out[at + 1], out[at + 2], out[at + 3] = one, two, three, four
+    for j in range(n):
+        k = np.uint64(at + j)
+        row[j] = weighed(t[k], t[k + _1], t[k + _2], t[k + _3], t[k + _4], t[k + _5], a, b, c, d, e, f)
 
 
 @part_kernel
 def moved_block(views, view, plane, y0, x0, h, w, dy, dx, rows, out):
     """out[plane, :h, :w] += 64² times the block at (y0 + dy, x0 + dx) of a plane; ``rows`` is (38, 40) for use.
 
-    Indices that cannot be negative are cast to unsigned: for others, numba emits a look for negative ones.
+    Of narrow blocks 16 columns are computed, in vectors: those beyond hold anything. Indices that cannot be negative
+    are cast to unsigned: for others, numba emits a look for negative ones.
     """
     source = views[view, plane]
     height, width = source.shape
     iy, ix = y0 + (dy >> 8), x0 + (dx >> 8)
     py, px = (dy >> 4) & 15, (dx >> 4) & 15
     first, count = (0, h) if py == 0 else (-BEFORE, h + TAPS - 1)
-    start, taken = ix - BEFORE, w + TAPS - 1
-    inside = start >= 0 and start + taken <= width
+    start, taken, lanes = ix - BEFORE, w + TAPS - 1, max(w, NARROW)
+    inside = start >= 0 and start + lanes + TAPS - 1 <= width
     bordered = rows[LARGEST + TAPS - 1]
     for i in range(count):
         line, row = source[np.uint64(clamped(iy + first + i, height))], rows[i]
         if not inside:
             for j in range(taken):
                 bordered[j] = line[np.uint64(clamped(start + j, width))]
-            _filter_row(bordered, 0, w, px, row)
+            _filter_row(bordered, 0, lanes, px, row)
         elif px == 0:
-            for j in range(w):
+            for j in range(lanes):
                 row[j] = np.int32(line[np.uint64(ix + j)]) * np.int32(64)
         else:
-            _filter_row(line, start, w, px, row)
+            _filter_row(line, start, lanes, px, row)
     a, b, c, d, e, f = FILTERS[py, 0], FILTERS[py, 1], FILTERS[py, 2], FILTERS[py, 3], FILTERS[py, 4], FILTERS[py, 5]
     for i in range(h):
-        into = out[plane, i]
+        into, one = out[plane, i], rows[i]
         if py == 0:
-            row = rows[i]
-            for j in range(w):
-                into[j] = np.int32(into[j] + np.int32(row[j] * np.int32(64)))
-        elif w == 4:
-            one, two = _filtered_down(rows, i, 0, a, b, c, d, e, f), _filtered_down(rows, i, 1, a, b, c, d, e, f)
-            three, four = _filtered_down(rows, i, 2, a, b, c, d, e, f), _filtered_down(rows, i, 3, a, b, c, d, e, f)
-            _add_four(into, 0, one, two, three, four)
+            for j in range(lanes):
+                into[j] = np.int32(into[j] + np.int32(one[j] * np.int32(64)))
         else:
-            for j in range(w):
-                into[j] = np.int32(into[j] + _filtered_down(rows, i, j, a, b, c, d, e, f))
+            two, three, four, five, six = rows[i + 1], rows[i + 2], rows[i + 3], rows[i + 4], rows[i + 5]
+            for j in range(lanes):
+                total = weighed(one[j], two[j], three[j], four[j], five[j], six[j], a, b, c, d, e, f)
+                into[j] = np.int32(into[j] + total)
