@@ -138,14 +138,15 @@ def new_matching(height: int, width: int, told: bool = True) -> Matching:
 
 
 @lane_part
-def widen(m, r, plane):
-    """m.wide[r] = a plane, and its border `MARGIN` times more to the left and right."""
+def widen(into, plane, repeated):
+    """into[:, MARGIN:] = a plane; before and after it `MARGIN` samples: its border ``repeated``, or `UNKNOWN`."""
     height, width = plane.shape
     for y in range(height):
-        row, into, before, beyond = plane[y], m.wide[r, y, MARGIN:], m.wide[r, y], m.wide[r, y, MARGIN + width :]
+        row, middle, before, beyond = plane[y], into[y, MARGIN:], into[y], into[y, MARGIN + width :]
         for x in range(width):
-            into[x] = row[x]
-        first, last = row[0], row[np.uint64(width - 1)]
+            middle[x] = row[x]
+        first = row[0] if repeated else np.int16(UNKNOWN)
+        last = row[np.uint64(width - 1)] if repeated else np.int16(UNKNOWN)
         for x in range(MARGIN):
             before[x], beyond[x] = first, last
 
@@ -160,20 +161,37 @@ def forget(m):
 @lane_part
 def prepare(m, views, disparities, sources):
     """Fill m.wide and m.told, and how far disparities reach."""
-    height, width = views.shape[2:]
     forget(m)
     for r in range(min(sources.shape[0], MATCHED)):
         view = np.uint64(sources[r, 0])
         m.work[_REACH + r] = np.float32(reach(sources, r))
-        widen(m, r, views[view, 0])
-        for y in range(height):
-            own, into, before, beyond = (
-                disparities[view, y], m.told[r, y, MARGIN:], m.told[r, y], m.told[r, y, MARGIN + width :],
-            )  # fmt: skip
-            for x in range(width):
-                into[x] = own[x]
-            for x in range(MARGIN):
-                before[x] = beyond[x] = UNKNOWN
+        widen(m.wide[r], views[view, 0], True)
+        widen(m.told[r], disparities[view], False)
+
+
+@lane_stage
+def _rows(wide, iy, ix):
+    """Four rows of a plane with margins, from (iy - 1, ix) on."""
+    height, first = wide.shape[0], min(max(ix, -MARGIN), wide.shape[1] - 2 * MARGIN) + MARGIN
+    one, two = wide[np.uint64(clamped(iy - 1, height)), first:], wide[np.uint64(clamped(iy, height)), first:]
+    three, four = wide[np.uint64(clamped(iy + 1, height)), first:], wide[np.uint64(clamped(iy + 2, height)), first:]
+    return one, two, three, four
+
+
+@lane_stage
+def _weights(py, px):
+    """Weights of two samples across, in sixteenths, and down."""
+    return np.float32(16 - px), np.float32(px), _UNIT * np.float32(16 - py), _UNIT * np.float32(py)
+
+
+@lane_stage
+def _three_between(one, two, three, four, j, a, b, c, e):
+    """Samples below each other between those of four rows, bilinearly, rounded down."""
+    upper = a * np.float32(two[j]) + b * np.float32(two[j + 1])
+    lower = a * np.float32(three[j]) + b * np.float32(three[j + 1])
+    above = np.floor(c * (a * np.float32(one[j]) + b * np.float32(one[j + 1])) + e * upper)
+    below = np.floor(c * lower + e * (a * np.float32(four[j]) + b * np.float32(four[j + 1])))
+    return above, np.floor(c * upper + e * lower), below
 
 
 @lane_stage
@@ -182,17 +200,10 @@ def _take(wide, iy, ix, py, px, work, at):
 
     Those of the next two rows follow `_ROW` and 2 `_ROW` places on.
     """
-    height, width = wide.shape[0], wide.shape[1] - 2 * MARGIN
-    a, b, c, e = np.float32(16 - px), np.float32(px), _UNIT * np.float32(16 - py), _UNIT * np.float32(py)
-    first = min(max(ix, -MARGIN), width) + MARGIN
-    one, two = wide[np.uint64(clamped(iy - 1, height)), first:], wide[np.uint64(clamped(iy, height)), first:]
-    three, four = wide[np.uint64(clamped(iy + 1, height)), first:], wide[np.uint64(clamped(iy + 2, height)), first:]
+    (one, two, three, four), (a, b, c, e) = _rows(wide, iy, ix), _weights(py, px)
     for j in range(LANES):
-        upper = a * np.float32(two[j]) + b * np.float32(two[j + 1])
-        lower = a * np.float32(three[j]) + b * np.float32(three[j + 1])
-        work[at + j] = np.floor(c * (a * np.float32(one[j]) + b * np.float32(one[j + 1])) + e * upper)
-        work[at + _ROW + j] = np.floor(c * upper + e * lower)
-        work[at + 2 * _ROW + j] = np.floor(c * lower + e * (a * np.float32(four[j]) + b * np.float32(four[j + 1])))
+        above, middle, below = _three_between(one, two, three, four, j, a, b, c, e)
+        work[at + j], work[at + _ROW + j], work[at + 2 * _ROW + j] = above, middle, below
 
 
 @lane_stage
@@ -318,20 +329,29 @@ def _one(views, disparities, sources, values, y, x, d):
 
 
 @stage_kernel
+def _place(m, width, y, x, d):
+    """Row of m.kept for the span of a sample and a disparity, and whether it holds them already; it is marked so."""
+    mark = ((y * width + (x >> LOG_SPAN)) << 16) | (d & 0xFFFF)
+    place = np.uint64(hashed(d) & (SLOTS - 1))
+    held = m.marks[place] == mark
+    m.marks[place] = mark
+    return place, held
+
+
+@stage_kernel
 def disagreement(s, m, y, x, d):
     """Return the difference of the sources around a sample for a disparity, in eighths of a code."""
-    width, across = s.counts.shape[1], x >> LOG_SPAN
-    mark, place = ((y * width + across) << 16) | (d & 0xFFFF), np.uint64(hashed(d) & (SLOTS - 1))
-    if m.marks[place] != mark:
-        m.marks[place] = mark
+    width, first = s.counts.shape[1], x & -SPAN
+    place, held = _place(m, width, y, x, d)
+    if not held:
         at_border = (y & (LARGEST - 1)) in (0, LARGEST - 1)  # of a square of shifts
         if s.sources.shape[0] < MATCHED or (s.sources.shape[1] > UNSHIFTED and at_border):
-            for i in range(across << LOG_SPAN, min((across + 1) << LOG_SPAN, width)):
+            for i in range(first, min(first + SPAN, width)):
                 cost = _one(s.views, s.disparities, s.sources, s.scratch[0], y, i, d)
-                m.kept[place, np.uint64(i & (SPAN - 1))] = cost
+                m.kept[place, np.uint64(i - first)] = cost
         else:
-            _fill(m, s.views, s.sources, s.scratch[0], y, across << LOG_SPAN, d, m.kept[place])
-    return np.int64(m.kept[place, np.uint64(x & (SPAN - 1))])
+            _fill(m, s.views, s.sources, s.scratch[0], y, first, d, m.kept[place])
+    return np.int64(m.kept[place, np.uint64(x - first)])
 
 
 @lane_stage
@@ -340,20 +360,11 @@ def _take_apart(wide, iy, ix, py, px, work, rows):
 
     The own samples are in the second place of each row; ``rows``: 1, or 0 for a row beyond the view.
     """
-    height, width = wide.shape[0], wide.shape[1] - 2 * MARGIN
-    a, b, c, e = np.float32(16 - px), np.float32(px), _UNIT * np.float32(16 - py), _UNIT * np.float32(py)
-    first = min(max(ix, -MARGIN), width) + MARGIN
-    one, two = wide[np.uint64(clamped(iy - 1, height)), first:], wide[np.uint64(clamped(iy, height)), first:]
-    three, four = wide[np.uint64(clamped(iy + 1, height)), first:], wide[np.uint64(clamped(iy + 2, height)), first:]
-    above, below = rows
+    (one, two, three, four), (a, b, c, e), (upper, lower) = _rows(wide, iy, ix), _weights(py, px), rows
     for j in range(LANES):
-        upper = a * np.float32(two[j]) + b * np.float32(two[j + 1])
-        lower = a * np.float32(three[j]) + b * np.float32(three[j + 1])
-        before = np.floor(c * (a * np.float32(one[j]) + b * np.float32(one[j + 1])) + e * upper)
-        beyond = np.floor(c * lower + e * (a * np.float32(four[j]) + b * np.float32(four[j + 1])))
-        apart = _truncated(np.floor(c * upper + e * lower), work[_ROW + LANES + j])
-        apart += above * _truncated(before, work[LANES + j]) + below * _truncated(beyond, work[2 * _ROW + LANES + j])
-        work[_APART + j] = apart
+        above, middle, below = _three_between(one, two, three, four, j, a, b, c, e)
+        apart = _truncated(middle, work[_ROW + LANES + j]) + upper * _truncated(above, work[LANES + j])
+        work[_APART + j] = apart + lower * _truncated(below, work[2 * _ROW + LANES + j])
 
 
 @lane_part
@@ -392,12 +403,11 @@ def _fill_mismatch(m, sources, y, x0, d, into):
 @stage_kernel
 def mismatch(s, m, y, x, d):
     """Return the difference of the best two sources from the decoded view around a sample, in eighths of a code."""
-    width, across = s.counts.shape[1], x >> LOG_SPAN
-    mark, place = ((y * width + across) << 16) | (d & 0xFFFF), np.uint64(hashed(d) & (SLOTS - 1))
-    if m.marks[place] != mark:
-        m.marks[place] = mark
-        _fill_mismatch(m, s.sources, y, across << LOG_SPAN, d, m.kept[place])
-    return np.int64(m.kept[place, np.uint64(x & (SPAN - 1))])
+    first = x & -SPAN
+    place, held = _place(m, s.counts.shape[1], y, x, d)
+    if not held:
+        _fill_mismatch(m, s.sources, y, first, d, m.kept[place])
+    return np.int64(m.kept[place, np.uint64(x - first)])
 
 
 @stage_kernel

@@ -442,8 +442,8 @@ def refine(s, m, at):
     """Let each sample take over a neighbour's disparity that fits the decoded view better, forward and backward."""
     forget(m)
     for r in range(min(s.sources.shape[0], MATCHED)):
-        widen(m, r, s.views[s.sources[r, 0], 0])
-    widen(m, MATCHED, s.views[at, 0])
+        widen(m.wide[r], s.views[s.sources[r, 0], 0], True)
+    widen(m.wide[MATCHED], s.views[at, 0], True)
     for backward in range(2):
         _pass_on(s, m, at, backward)
 

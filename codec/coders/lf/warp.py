@@ -15,7 +15,6 @@ from .transform import LARGEST
 UNIT = 256
 TAPS = 6
 NARROW = 16  # columns of a block that are computed at least
-_1, _2, _3, _4, _5 = (np.uint64(k) for k in range(1, 6))
 BEFORE = 2  # taps before the sample at or left of the position
 
 
@@ -81,8 +80,9 @@ def _filter_row(t, at, n, phase, row):
     a, b, c = FILTERS[phase, 0], FILTERS[phase, 1], FILTERS[phase, 2]
     d, e, f = FILTERS[phase, 3], FILTERS[phase, 4], FILTERS[phase, 5]
     for j in range(n):
-        k = np.uint64(at + j)
-        row[j] = weighed(t[k], t[k + _1], t[k + _2], t[k + _3], t[k + _4], t[k + _5], a, b, c, d, e, f)
+        one, two, three = t[np.uint64(at + j)], t[np.uint64(at + j + 1)], t[np.uint64(at + j + 2)]
+        four, five, six = t[np.uint64(at + j + 3)], t[np.uint64(at + j + 4)], t[np.uint64(at + j + 5)]
+        row[j] = weighed(one, two, three, four, five, six, a, b, c, d, e, f)
 
 
 @part_kernel
