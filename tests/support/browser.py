@@ -17,10 +17,11 @@ READY = """() => Promise.race([
 
 
 def mark(items):
-    """Mark every test that drives a browser."""
+    """Mark every test that drives a browser; all are slow, for together they take a tenth of the time of the others."""
     for item in items:
         if "browser" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.browser)
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="session")
