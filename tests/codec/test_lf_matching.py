@@ -59,7 +59,7 @@ def test_the_table_holds_inner_products_of_the_differences(every):
     """Also for the squares at the border, and for disparities that lead beyond it."""
     job = example()
     views = job.views
-    match = new_match((HIGH - LOW) // every + 1, every)
+    match = new_match(HIGH - LOW + 1, every)
     for y0 in (0, 32):
         for x0 in (0, 32):
             fill_products(job, views[3], y0, x0, match)

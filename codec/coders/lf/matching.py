@@ -53,6 +53,12 @@ class Match(NamedTuple):
     sums : ndarray of float32, (PAIRS, LARGEST)
     moved : ndarray of float32, (MOST_REFERENCES, 3 · LARGEST²)
         Differences between a block and its references as decoded, plane by plane and row by row.
+    known : ndarray of bool, (span, CELLS, CELLS)
+        Of each index of the range and 4×4 samples of the square, whether ``decoded`` holds them.
+    decoded : ndarray of float32, (span, CELLS, CELLS, PAIRS)
+        Inner products of differences from references as decoded, for blocks of other shapes that try the same index.
+    pairs : ndarray of float32, (PAIRS,)
+        Their sums over a block.
     sets : ndarray of float64, (2^MOST_REFERENCES,)
         Sums of inner products over the pairs of each set of references.
     tried : ndarray of int64, (MOST_TRIED,)
@@ -69,12 +75,16 @@ class Match(NamedTuple):
     between: Any
     sums: Any
     moved: Any
+    known: Any
+    decoded: Any
+    pairs: Any
     sets: Any
     tried: Any
 
 
-def new_match(indices: int, every: int, hurried: int = 0) -> Match:
-    """Memory for one square after another."""
+def new_match(span: int, every: int, hurried: int = 0) -> Match:
+    """Memory for one square after another, for a range of so many indices."""
+    indices = (span - 1) // every + 1
     return Match(
         every=every,
         indices=np.zeros(indices, np.int64),
@@ -87,6 +97,9 @@ def new_match(indices: int, every: int, hurried: int = 0) -> Match:
         between=np.zeros(LARGEST + 1, np.float32),
         sums=np.zeros((PAIRS, LARGEST), np.float32),
         moved=np.zeros((MOST_REFERENCES, 3 * LARGEST * LARGEST), np.float32),
+        known=np.zeros((span, CELLS, CELLS), np.bool_),
+        decoded=np.zeros((span, CELLS, CELLS, PAIRS), np.float32),
+        pairs=np.zeros(PAIRS, np.float32),
         sets=np.zeros(1 << MOST_REFERENCES),
         tried=np.zeros(MOST_TRIED, np.int64),
     )
@@ -122,15 +135,20 @@ def _missed_rows(plane, original, y0, x0, dy, dx, between, missed):
 
 
 @stage_kernel
-def _add_rows(one, other, columns, sums):
-    """Fill sums with inner products of each column's four samples."""
+def _add_rows(one, other, at, columns, sums):
+    """Add inner products of each column's samples in four rows from a place on."""
     for x in range(columns):
-        total = np.float32(0)
-        total += one[x] * other[x]
-        total += one[LARGEST + x] * other[LARGEST + x]
-        total += one[2 * LARGEST + x] * other[2 * LARGEST + x]
-        total += one[3 * LARGEST + x] * other[3 * LARGEST + x]
-        sums[x] = total
+        a, b = np.uint64(at + x), np.uint64(at + columns + x)
+        c, d = np.uint64(at + 2 * columns + x), np.uint64(at + 3 * columns + x)
+        total = one[a] * other[a] + one[b] * other[b]
+        sums[np.uint64(x)] += total + one[c] * other[c] + one[d] * other[d]
+
+
+@stage_kernel
+def _of_cell(sums, cell):
+    """Sum of four columns."""
+    a, b, c, d = np.uint64(4 * cell), np.uint64(4 * cell + 1), np.uint64(4 * cell + 2), np.uint64(4 * cell + 3)
+    return (sums[a] + sums[b]) + (sums[c] + sums[d])
 
 
 @part_kernel
@@ -165,6 +183,7 @@ def _list_indices(job, match, y0, x0):
 def fill_products(job, original, y0, x0, match):
     """match.products = inner products of the references' differences from the square at (y0, x0)."""
     _list_indices(job, match, y0, x0)
+    match.known[:] = False
     height, width = original.shape[1:]
     rows, cols = min(CELLS, (height - y0) >> 2), min(CELLS, (width - x0) >> 2)
     count = job.references.shape[0]
@@ -178,13 +197,12 @@ def fill_products(job, original, y0, x0, match):
                 own, plane = match.missed[r], job.views[job.references[r, 0], 0]
                 _missed_rows(plane, original[0], y0 + 4 * by, x0, dy, dx, match.between, own)
                 for s in range(r + 1):
-                    _add_rows(own, match.missed[s], 4 * cols, sums[at])
+                    sums[at] = 0
+                    _add_rows(own, match.missed[s], 0, LARGEST, sums[at])
                     at += 1
             for bx in range(cols):
                 for at in range(count * (count + 1) >> 1):
-                    row, x = sums[at], np.uint64(4 * bx)
-                    total = (row[x] + row[x + np.uint64(1)]) + (row[x + np.uint64(2)] + row[x + np.uint64(3)])
-                    products[by, bx, at, k] = total
+                    products[by, bx, at, k] = _of_cell(sums[at], bx)
 
 
 @part_kernel
@@ -293,29 +311,52 @@ def _compare(job, match, work, original, y0, x0, h, w, index, planes):
                     missed[np.uint64(at + x)] = np.float32(difference)
 
 
-@stage_kernel
-def _dot(one, other, size):
-    """Inner product; the order of the sums is fixed, for the choices of the search follow from them."""
-    total = np.float32(0)
-    for k in range(size >> 2):
-        w, x, y, z = np.uint64(4 * k), np.uint64(4 * k + 1), np.uint64(4 * k + 2), np.uint64(4 * k + 3)
-        a, b = one[w] * other[w], one[x] * other[x]
-        total += (a + b) + (one[y] * other[y] + one[z] * other[z])
-    return total
+@part_kernel
+def _fill_decoded(job, match, work, original, planes, y0, x0, shape, index):
+    """match.decoded = inner products of the block's differences from its references, of each of its 4×4."""
+    (h, w), by, bx = sides(shape), (y0 >> 2) & (CELLS - 1), (x0 >> 2) & (CELLS - 1)
+    _compare(job, match, work, original, y0, x0, h, w, index, planes)
+    decoded, sums = match.decoded[index - job.low], match.sums[0]
+    for i in range(h >> 2):
+        at = 0
+        for r in range(job.references.shape[0]):
+            for s in range(r + 1):
+                sums[:w] = 0
+                for p in range(planes):
+                    _add_rows(match.moved[r], match.moved[s], (p * h + 4 * i) * w, w, sums)
+                for j in range(w >> 2):
+                    decoded[by + i, bx + j, at] = _of_cell(sums, j)
+                at += 1
+        for j in range(w >> 2):
+            match.known[index - job.low, by + i, bx + j] = True
+
+
+@part_kernel
+def _decoded_products(job, match, work, original, planes, y0, x0, shape, index):
+    """match.pairs = inner products of a block's differences from its references as decoded."""
+    (h, w), by, bx = sides(shape), (y0 >> 2) & (CELLS - 1), (x0 >> 2) & (CELLS - 1)
+    known, missing = match.known[index - job.low], False
+    for i in range(by, by + (h >> 2)):
+        for j in range(bx, bx + (w >> 2)):
+            missing |= not known[i, j]
+    if missing:
+        _fill_decoded(job, match, work, original, planes, y0, x0, shape, index)
+    pairs, count = match.pairs, job.references.shape[0]
+    pairs[:] = 0
+    for i in range(by, by + (h >> 2)):
+        for j in range(bx, bx + (w >> 2)):
+            cell = match.decoded[index - job.low, i, j]
+            for at in range(count * (count + 1) >> 1):
+                pairs[at] += cell[at]
 
 
 @part_kernel
 def _best_set(costs, job, match, work, original, weight, planes, y0, x0, shape, index):
     """Squared error + weight · bits of an index by the best set of references, and that set."""
-    (h, w), by, bx = sides(shape), y0 >> 2, x0 >> 2
-    count, total, sets = job.references.shape[0], match.total, match.sets
+    by, bx = y0 >> 2, x0 >> 2
+    count, pairs, sets = job.references.shape[0], match.pairs, match.sets
     where, seen = from_where(job, by, bx, shape, index), seen_mask(job, by, bx, shape, index)
-    _compare(job, match, work, original, y0, x0, h, w, index, planes)
-    at = 0
-    for r in range(count):
-        for s in range(r + 1):
-            total[at, 0] = _dot(match.moved[r], match.moved[s], planes * h * w)
-            at += 1
+    _decoded_products(job, match, work, original, planes, y0, x0, shape, index)
     side = weight * kind_cost(costs, job, by, bx, shape, np.int64(EXPLICIT), index, np.int64(0), np.int64(0))
     best, best_mask = HUGE, 1
     sets[0] = 0
@@ -327,8 +368,8 @@ def _best_set(costs, job, match, work, original, weight, planes, y0, x0, shape, 
             for s in range(r):
                 if (rest >> s) & 1:
                     members += 1
-                    error += 2 * total[first + s, 0]
-            error += total[first + r, 0]
+                    error += 2 * pairs[first + s]
+            error += pairs[first + r]
             mask = (1 << r) + rest
             sets[mask] = error
             cost = error / np.float32(members * members) + side

@@ -379,5 +379,5 @@ def find_blocks(costs: NDArray[np.float32], job: Job, search: Search) -> None:
     """Find, mark and decode all blocks of a view."""
     references = len(job.references)
     every = 2 if job.unit <= EIGHTH // 2 or job.high - job.low > FEW else 1
-    match = new_match((job.high - job.low) // every + 1 if references else 1, every, search.hurried)
+    match = new_match(job.high - job.low + 1 if references else 1, every, search.hurried)
     _search_view(costs, job, search, match, new_work(), new_trial())
