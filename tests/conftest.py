@@ -11,8 +11,8 @@ from raytrace_ii import cli
 from tests.support import browser as browsers
 from tests.support.browser import browser, show, show_once  # noqa: F401
 
-# The first call of a kernel compiles it, which would exceed any deadline. CI uses the same examples every time. Half of
-# the usual number of examples saves 5 s of `make test`.
+# The first call of a kernel compiles it, which would exceed any deadline. CI uses the same examples every time. Half
+# of the usual number of examples saves 5 s of `make test`.
 settings.register_profile("here", max_examples=50, deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("here")
 

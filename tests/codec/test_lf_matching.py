@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from codec.coders.lf import arithmetic, contexts, synthesis
+from codec.coders.lf import arithmetic, contexts, matching, synthesis
 from codec.coders.lf.agreement import new_matching
+from codec.coders.lf.blocks import predict_explicit
 from codec.coders.lf.kinds import DIFFERENT
 from codec.coders.lf.matching import CELLS, fill_products, new_match
-from codec.coders.lf.state import UNKNOWN, Job, new_blocks
+from codec.coders.lf.state import UNKNOWN, Job, new_blocks, new_work
 from codec.coders.lf.stream import UPRIGHT
 from tests.support.slow import first_fast
 
@@ -89,6 +90,29 @@ def test_a_hurried_search_has_the_disparities_of_the_synthesis():
     job = example()
     fill_products(job, job.views[3], 0, 0, match)
     assert match.indices[: match.count[0]].tolist() == list(range(LOW, HIGH + 1))
+
+
+@pytest.mark.slow  # two kernels are compiled for it
+def test_inner_products_as_decoded_are_those_of_predictions():
+    """Of a block, of one that has a part of them, of its parts, and of blocks of another square, which has none."""
+    job, work, match = example(), new_work(), new_match(HIGH - LOW + 1, 1)
+    original = job.views[3]
+    shapes = (16, 16, (4, 4)), (0, 0, (5, 5)), (8, 16, (3, 4)), (28, 0, (2, 5)), (0, 32, (4, 4)), (8, 40, (3, 3))
+    for index in (np.int64(-9), np.int64(4)):
+        square = None
+        for y0, x0, shape in shapes:
+            if square != (y0 // 32, x0 // 32):
+                square = y0 // 32, x0 // 32
+                fill_products(job, original, 32 * square[0], 32 * square[1], match)
+            h, w = 1 << shape[0], 1 << shape[1]
+            missed = []
+            for r in range(3):
+                predict_explicit(job, work, y0, x0, shape, index, np.int64(1 << r))
+                missed.append(work.predicted[:, :h, :w] - original[:, y0 : y0 + h, x0 : x0 + w].astype(np.int64))
+            expected = [np.sum(missed[r] * missed[s]) for r in range(3) for s in range(r + 1)]
+            matching._decoded_products(job, match, work, original, np.int64(3), y0, x0, shape, index)
+            # Sums of 3072 products of up to 1800² in single precision.
+            np.testing.assert_allclose(match.pairs[:6], expected, rtol=1e-5, atol=300)
 
 
 def test_costs_are_those_of_the_coder():

@@ -17,7 +17,7 @@ READY = """() => Promise.race([
 
 
 def mark(items):
-    """Mark every test that drives a browser; all are slow, for together they take a tenth of the time of the others."""
+    """Mark every test that drives a browser. Together they take a tenth of the time of the others: all are slow."""
     for item in items:
         if "browser" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.browser)
