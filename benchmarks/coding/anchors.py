@@ -129,8 +129,9 @@ def at_quantiser(
 def luma_psnr(original: IIPicture, decoded: IIPicture, own: Any = None) -> float:
     """Return the mean over views of the PSNR of Y; ``own`` are codes of 10 bit that the decoder returned."""
     columns, rows = original.ei_pixels
-    wanted = codes(original.pixels / 255)[..., 0]
-    found = (codes(decoded.pixels / 255) if own is None else own)[..., 0].astype(np.float64)
+    peak = np.iinfo(original.pixels.dtype).max
+    wanted = codes(original.pixels / peak)[..., 0]
+    found = (codes(decoded.pixels / peak) if own is None else own)[..., 0].astype(np.float64)
     error = np.square(found - wanted).reshape(-1, rows, wanted.shape[1] // columns, columns).mean(axis=(0, 2))
     return float((20 * np.log10(PEAK) - 10 * np.log10(np.maximum(error, 1e-6))).mean())
 

@@ -105,7 +105,7 @@ class AnchorCoder:
         Raises
         ------
         ValueError
-            If the subject is a video or not of 8 bit, or FFmpeg fails.
+            If the subject is a video or a picture of floats, or FFmpeg fails.
         """
         key = _hash(picture := _picture(self.name, subject))
         count = math.prod(picture.size)
@@ -152,9 +152,13 @@ class AnchorCoder:
 
 
 def _picture(name: str, subject: Subject) -> IIPicture:
-    if not isinstance(subject, IIPicture) or subject.pixels.dtype != np.uint8:
-        raise ValueError(f"anchor {name} codes pictures of 8 bit")
+    if not isinstance(subject, IIPicture) or subject.pixels.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"anchor {name} codes pictures of 8 or 16 bit")
     return subject
+
+
+def _peak(pixels: NDArray[Any]) -> int:
+    return int(np.iinfo(pixels.dtype).max)
 
 
 def _hash(picture: IIPicture) -> str:
@@ -257,7 +261,7 @@ def _frames(anchor: Anchor, picture: IIPicture) -> bytes:
     columns, rows = picture.ei_pixels
     if anchor.mosaic:
         tiled = np.block([[[views[row, column]] for column in range(columns)] for row in range(rows)])
-        return (tiled.astype("<u2") * 257).tobytes()
+        return (tiled.astype("<u2") * (65535 // _peak(tiled))).tobytes()
     size = _view_size(anchor, picture)
     return b"".join(_frame(anchor, views[place], size) for place in anchor.order(rows, columns))
 
@@ -265,7 +269,7 @@ def _frames(anchor: Anchor, picture: IIPicture) -> bytes:
 def _frame(anchor: Anchor, view: NDArray[Any], size: tuple[int, int]) -> bytes:
     """Return the samples of a view; its border is repeated up to the size."""
     margin = (0, size[1] - view.shape[0]), (0, size[0] - view.shape[1])
-    planes = [np.pad(plane, margin, mode="edge") for plane in np.moveaxis(codes(view / 255), 2, 0)]
+    planes = [np.pad(plane, margin, mode="edge") for plane in np.moveaxis(codes(view / _peak(view)), 2, 0)]
     if "420" in anchor.pixels:
         planes[1:] = map(reduced, planes[1:])
     return b"".join(np.clip(np.rint(plane), 0, MOST).astype("<u2").tobytes() for plane in planes)
@@ -273,22 +277,22 @@ def _frame(anchor: Anchor, view: NDArray[Any], size: tuple[int, int]) -> bytes:
 
 def _decoded(anchor: Anchor, like: IIPicture, raw: bytes, seconds: float) -> Decoded:
     """Return the picture of all frames."""
-    columns, rows = like.ei_pixels
-    width, height = _view_size(anchor, like)
+    (columns, rows), (width, height), peak = like.ei_pixels, _view_size(anchor, like), _peak(like.pixels)
     out = like.with_pixels(np.empty(like.pixels.shape, np.uint16))
     places = {(row, column): view for row, column, view in camera_views(out)}  # views of `out`, in place
     samples = np.frombuffer(raw, "<u2")
     if anchor.mosaic:
         tiles = samples.reshape(rows, height, columns, width, 3)
         for (row, column), view in places.items():
-            view[...] = (tiles[row, :, column] + np.uint32(128)) // 257
-        return Decoded(like.with_pixels(out.pixels.astype(np.uint8)), seconds)
+            unit = np.uint32(65535 // peak)
+            view[...] = (tiles[row, :, column] + unit // 2) // unit
+        return Decoded(like.with_pixels(out.pixels.astype(like.pixels.dtype)), seconds)
     frames = samples.reshape(rows * columns, -1)
     for place, frame in zip(anchor.order(rows, columns), frames, strict=True):
         places[place][...] = _planes(frame, (width, height))[: like.lenses[1], : like.lenses[0]]
     pixels = np.empty_like(like.pixels)
     for before, after in zip(out.pixels, pixels, strict=True):  # row by row, to save memory
-        after[...] = np.rint(np.clip(255 * of_video_codes(before), 0, 255))
+        after[...] = np.rint(np.clip(peak * of_video_codes(before), 0, peak))
     return Decoded(like.with_pixels(pixels), seconds, out.pixels)
 
 

@@ -95,9 +95,22 @@ def test_what_an_anchor_cannot_take_is_refused(picture):
     pytest.importorskip("imageio_ffmpeg")
     with pytest.raises(ValueError, match="unknown anchor 'h264': known are vvenc"):
         AnchorCoder("h264")
-    deep = IIPicture(picture.pixels.astype(np.uint16), picture.lenses, picture.ei_pixels)
-    with pytest.raises(ValueError, match="x265 codes pictures of 8 bit"):
-        AnchorCoder("x265").encode(deep, "x265", bpp=1.0)
+    floats = IIPicture(picture.pixels.astype(np.float32), picture.lenses, picture.ei_pixels)
+    with pytest.raises(ValueError, match="x265 codes pictures of 8 or 16 bit"):
+        AnchorCoder("x265").encode(floats, "x265", bpp=1.0)
+
+
+@pytest.mark.parametrize("name", ["x265", "jpegxl"])
+def test_sixteen_bits_are_coded_as_eight_with_more_between(picture, name):
+    """Pixels 257 times as large make the same file, and come back 257 times as large, between steps of 8 bit, too."""
+    pytest.importorskip("imageio_ffmpeg")
+    deep = IIPicture(picture.pixels.astype(np.uint16) * 257, picture.lenses, picture.ei_pixels)
+    quantiser = ANCHORS[name].quantiser(3)
+    one, other = (AnchorCoder(name).encode_at(subject, quantiser) for subject in (picture, deep))
+    assert one.data == other.data
+    eight, sixteen = (AnchorCoder(name).decode(coded).picture.pixels for coded in (one, other))
+    assert sixteen.dtype == np.uint16 and np.abs(sixteen / 257 - eight).max() <= 0.502
+    assert (sixteen % 257 != 0).any()
 
 
 def test_settings_name_their_quantiser():
