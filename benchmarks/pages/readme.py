@@ -89,7 +89,7 @@ def peers_table() -> list[str]:
 def anchor_claims() -> tuple[list[tuple[str, ...]], list[Row]]:
     """Return `si-lf` against each anchor by each measure, and the rows that say it: mean, and the worst picture."""
     rows = anchors.RECORDS.rows()
-    groups = (*light_field.SCENES, *light_field.FIELDS), anchors.VIEWS
+    groups = (*light_field.SCENES, *light_field.FIELDS), [f"{name}-5x5" for name in anchors.PHOTOGRAPHS]
     claims: list[tuple[str, ...]] = []
     for measure, label in MEASURES.items():
         for scheme, peer in ANCHORS.items():

@@ -6,10 +6,7 @@ from collections.abc import Mapping
 
 from .profile import Profile, Reference
 
-CAPTION = (
-    "SHA-256 is that of the pixels (rows of R, G, B, one byte each, or two of 16 bit, the lower first; frame after "
-    "frame); z is in mm."
-)
+CAPTION = "SHA-256 is that of the pixels (rows of R, G, B, one byte each, frame after frame); z is in mm."
 HEAD = ("picture", "what it is for", "scene", "camera", "lenses, pixels under each", "samples", "SHA-256")
 PHOTOGRAPHS = ("picture", "camera", "views, pixels of each", "repository", "licence", "SHA-256")
 
