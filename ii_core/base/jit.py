@@ -19,12 +19,12 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
+from numba import types
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.dispatcher import Dispatcher
-from numba.core.types import unliteral
 from numba.extending import intrinsic, overload
 
 
@@ -303,8 +303,10 @@ def _part(function: Callable[..., Any], compiler: type[_PartCompiler] = _PartCom
 
 def _call_without_literals(compiled: Any, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
     """Resolve a call of a part: a number written in the call would compile a part of its own."""
-    plain = tuple(unliteral(kind) for kind in arguments)
-    return Dispatcher.get_call_template(compiled, plain, {name: unliteral(kind) for name, kind in keywords.items()})
+    plain = tuple(types.unliteral(kind) for kind in arguments)
+    return Dispatcher.get_call_template(
+        compiled, plain, {name: types.unliteral(kind) for name, kind in keywords.items()}
+    )
 
 
 def late_kernel(function: Callable[..., Any]) -> Any:

@@ -12,8 +12,6 @@ from typing import Any
 
 import typer
 
-from ii_core.base.foreign import ForeignError
-
 from . import synthesize, render, pictures, calibrating, coding, evaluate, benchmarking, show, eye
 from . import depth, focus, measure_depth, observers, retarget, video
 from .common import app
@@ -74,18 +72,19 @@ def _run() -> None:
         if not isinstance(error, NotInstalled):
             raise
         _fail(str(error))
-    except ForeignError as error:
-        _fail(str(error))
     except RecursionError:
         _fail("the input nests too deeply")
     except (KeyboardInterrupt, typer.Abort):
         print("interrupted", file=sys.stderr)
         sys.exit(INTERRUPTED)
     except Exception as error:
-        # A wrong option or argument: typer's own message, without its frame.
-        if not hasattr(error, "format_message"):
+        if hasattr(error, "format_message"):  # a wrong option or argument: typer's own message, without its frame
+            _fail(error.format_message())
+        from ii_core.base.foreign import ForeignError
+
+        if not isinstance(error, ForeignError):
             raise
-        _fail(error.format_message())
+        _fail(str(error))
 
 
 def _warn(

@@ -11,9 +11,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ii_core.base.atomic import remove_temporaries
-from ii_core.base.interrupt import Terminated
-
 GRACE_SECONDS = 1.5  # time limit of the cleanup, even if compiled code runs longer
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
 SHOW_CURSOR = b"\x1b[?25h"  # progress bars hide the cursor
@@ -48,12 +45,21 @@ def ends_soon() -> Iterator[None]:
         if ended:
             told.close()  # ends the thread
         else:
-            remove_temporaries()  # of which the interrupt has left the cleanup out
+            _remove_unfinished()  # of which the interrupt has left the cleanup out
             told.detach()  # Python waits for the threads of pools when it exits: the time limit stays until then
 
 
 def _terminate(number: int, frame: Any) -> None:
+    from ii_core.base.interrupt import Terminated
+
     raise Terminated(CODES[signal.SIGTERM])
+
+
+def _remove_unfinished() -> None:
+    """Remove unfinished files, which there are none of before the module that makes them is imported."""
+    remove = getattr(sys.modules.get("ii_core.base.atomic"), "remove_temporaries", None)
+    if remove is not None:
+        remove()
 
 
 def _watch(heard: socket.socket, left: threading.Event) -> None:
@@ -72,7 +78,7 @@ def _watch(heard: socket.socket, left: threading.Event) -> None:
 
 def _stop(code: int, *, said: bool) -> None:
     """End the process without waiting for threads; remove its unfinished files; print "interrupted" unless done."""
-    remove_temporaries()
+    _remove_unfinished()
     if sys.stderr.isatty():
         os.write(2, SHOW_CURSOR)
     if not said:

@@ -11,8 +11,6 @@ from typing import Annotated
 
 import typer
 
-from ii_core.base.interrupt import STOPS
-
 Plugins = Annotated[
     list[Path] | None,
     typer.Option("--plugin", help="A Python file that registers coders or measures; may be repeated."),
@@ -41,6 +39,7 @@ def load_plugins(paths: Sequence[Path] | None) -> None:
 
 def _run(path: Path) -> None:
     from ii_core.base.files import check_file, one_line
+    from ii_core.base.interrupt import STOPS
 
     check_file(path)
     if path.suffix != ".py":

@@ -145,6 +145,7 @@ def test_other_code_is_measured_again_and_the_newest_row_counts(monkeypatch):
     assert [row["value"] for row in TOY.rows()] == [2] and len(TOY.path.read_text().splitlines()) == 2
 
 
+@pytest.mark.slow
 def test_a_kill_loses_the_row_in_work_alone():
     script = f"""
 import os, signal

@@ -25,6 +25,7 @@ def test_no_error_is_accidental(named, tmp_path, monkeypatch):
     assert counts["refused"] > 25000
 
 
+@pytest.mark.slow
 def test_every_public_function_is_tried_with_every_argument(named):
     """The first version left out 29 functions, and counted only the last call of each function.
 

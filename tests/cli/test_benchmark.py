@@ -39,6 +39,7 @@ scale = 64
 VIDEO = TINY + "frames = 2\n"
 
 
+@pytest.mark.slow
 def test_a_coder_is_run_and_ranked(run, tmp_path):
     (tmp_path / "tiny.toml").write_text(TINY)
     definition = str(tmp_path / "tiny.toml")

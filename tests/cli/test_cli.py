@@ -445,6 +445,7 @@ def test_support_images_in_one_file_and_alone(run, tmp_path):
     assert "disparity" not in read_channels(tmp_path / "f.exr"), "one lens has no neighbour"
 
 
+@pytest.mark.slow
 def test_adaptive_samples(run, tmp_path):
     code, out, _ = run(*OBJECTS, "-o", tmp_path / "p.png", "--samples", "4..16", "--error", 2, "--seed", 3)
     shot = render(load_scene("objects"), CAMERA, samples=(4, 16), error=2.0, seed=3)

@@ -126,6 +126,7 @@ def test_a_stream_of_other_frames_is_refused(scheme):
         decode(replace(coded, structure=structure))
 
 
+@pytest.mark.slow
 def test_rates_below_the_headers_are_settled_by_one_run():
     for scheme in ("ei-h264", "ei-hevc:fast", "ei-av1:fast", "ei-vp9:fast", "ei-mpeg2"):
         coded = encode(textured(), scheme, bpp=1e-6)

@@ -78,6 +78,7 @@ def test_the_coder_of_the_page_is_a_scheme_of_every_command(command, package):
     assert "damaged" in command("decode", "noise.ii", "-o", "other.png", ok=False)
 
 
+@pytest.mark.slow
 def test_a_plugin_that_fails_is_a_warning_and_others_go_on(package):
     """In a process of its own, whose warnings go to its error output."""
     points = package / "my-1.0.dist-info" / "entry_points.txt"

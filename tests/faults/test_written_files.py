@@ -139,6 +139,7 @@ def content(name):
     return np.arange(90).reshape(5, 6, 3).astype(kinds[name[-4:]])
 
 
+@pytest.mark.slow
 def test_equal_content_makes_equal_files(tmp_path):
     """EXR, TIFF and MATLAB's files had the time of day in them, Matroska random numbers."""
     field = picture()

@@ -98,7 +98,7 @@ def disc(front, back, size=(72, 60), views=7, radius=17.0):
     return IIPicture(codes.reshape(l * views, k * views, 3), size, (views, views)), true
 
 
-@pytest.mark.parametrize(("front", "back"), first_fast([(1.5, -0.5), (0.4, -0.4)]))
+@pytest.mark.parametrize(("front", "back"), first_fast([(0.4, -0.4), (1.5, -0.5)]))
 def test_only_the_outermost_pixels_of_a_body_may_be_lost(front, back):
     picture, truth = disc(front, back)
     found = estimate_depth(picture)
@@ -145,7 +145,7 @@ def test_behind_a_main_lens_disparities_have_both_signs(lens):
     np.testing.assert_allclose(found.depth_mm, depth_of_disparity(camera, found.disparity))
 
 
-@pytest.mark.parametrize("at", [-0.9, 0.0])
+@pytest.mark.parametrize("at", first_fast([-0.9, 0.0]))
 def test_the_range_of_many_small_views_is_that_of_what_is_seen(at):
     """The planes of a stack were those that a camera can see: −48…0 px for disparities of −6…−1."""
     picture, truth = slanted(views=(16, 16), size=(64, 32), at=at, slope=0.002)

@@ -112,6 +112,7 @@ def test_other_profiles_are_refused_in_one_line(tmp_path, icc, said):
     assert "convert it to sRGB first" in str(error.value) and "\n" not in str(error.value)
 
 
+@pytest.mark.slow
 def test_damaged_profiles_are_refused():
     whole = profile(ADOBE, PARAMETRIC)
     rng = np.random.default_rng(0)

@@ -101,6 +101,7 @@ def test_a_killed_take_goes_on(tmp_path):
     assert len([name for name in after if name.endswith(".png")]) == count
 
 
+@pytest.mark.slow
 def test_memory_is_that_of_a_still_however_many_frames(take, tmp_path):
     """Peaks of numpy's and Python's allocations, after a first frame has filled the caches."""
     camera = preset("setup1", scale=32)

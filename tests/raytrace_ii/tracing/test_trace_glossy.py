@@ -105,6 +105,7 @@ def test_a_nearly_smooth_mirror_shows_the_mirrors_picture():
     assert np.abs(shot(0.0) - shot(0.5)).max() > 50
 
 
+@pytest.mark.slow
 def test_glossy_pictures_are_independent_of_workers_and_tiles(monkeypatch):
     """To the bit, by workers and tiles; another seed gives other noise; more samples less."""
     camera = preset("setup1", scale=128)
