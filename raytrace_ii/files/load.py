@@ -74,9 +74,13 @@ WORKING_VOLUME = np.array([[-20.0, -10.0, 20.0], [20.0, 10.0, 80.0]])
 def scene_names() -> dict[str, str]:
     """Return the names of the scenes of the package with a description in one line."""
     found = {}
-    for file in sorted(Path(str(files("assets") / "scenes")).glob("*.toml")):
+    for file in _scene_files():
         found[file.stem] = str(tomllib.loads(file.read_text(encoding="utf-8")).get("about", ""))
     return found
+
+
+def _scene_files() -> list[Path]:
+    return sorted(Path(str(files("assets") / "scenes")).glob("*.toml"))
 
 
 def load_scene(
@@ -132,12 +136,12 @@ def scene_path(name: str | os.PathLike[str]) -> Path:
         raise TypeError(f"name is {name!r}: the name of a scene or a path is needed")
     path = Path(name)
     if path.suffix != ".toml" and not is_mesh(path):
-        known = scene_names()
+        known = {file.stem: file for file in _scene_files()}
         if str(name) not in known:
             raise ValueError(
                 f"unknown scene {str(name)!r}: known are {', '.join(known)}, or give a .toml or mesh file"
             )
-        path = Path(str(files("assets") / "scenes" / f"{name}.toml"))
+        path = known[str(name)]
     check_file(path)
     return path
 

@@ -36,7 +36,8 @@ def texture(x, y):
     """Light of a smooth random texture at places of the reference view, (…, 3)."""
     waves, phases, sizes = WAVES
     turns = x[..., None] * waves[:, 0] + y[..., None] * waves[:, 1]
-    light = sum(s * np.sin(turns[..., i, None] + p) for i, (p, s) in enumerate(zip(phases, sizes, strict=True)))
+    sines, cosines = sizes[:, None] * np.cos(phases), sizes[:, None] * np.sin(phases)
+    light = np.sin(turns) @ sines + np.cos(turns) @ cosines
     return np.clip(0.5 + light / 16, 0, 1)
 
 

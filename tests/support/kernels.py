@@ -35,8 +35,9 @@ def rendering():
     from tests.support.trace_scenes import hall
 
     for name in "apples", "car", "objects", "twins":
+        scene = load_scene(name)
         for camera in preset("setup1", scale=64), preset("pinhole2d", scale=64):
-            render(load_scene(name), camera, support=("depth", "normal"))
+            render(scene, camera, support=("depth", "normal"))
     render(hall(), preset("setup1", scale=128), samples=(4, 16), error=4.0)
     render(hall(), preset("setup1", scale=128), samples=4, dtype="float32", audit=0.1)
     trace(hall(), np.zeros((99, 3)), np.ones((99, 3)))
