@@ -59,7 +59,7 @@ $(VENV)/.docs: $(VENV)/.installed
 	touch $@
 
 # sources of which little or nothing is imported: compiling them would take 5 s
-UNUSED := '/(tests|fontTools|mypyc?|networkx|pip|pkg_resources|playwright|pygments|setuptools)/'
+UNUSED := '/(tests|fontTools|mypyc?|pip|pkg_resources|playwright|pygments|setuptools)/'
 $(VENV)/.installed: pyproject.toml
 	"$(PYTHON)" -c "" 2>/dev/null || { echo "no Python from 3.11 on was found: install one or type make PYTHON=..." >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
