@@ -178,6 +178,7 @@ def test_records_hold_every_point_in_the_given_order():
     assert any("coarse:order=spiral,gop=32 9 bpp" in text and "target 3 not reached" in text for *_, text in told)
 
 
+@pytest.mark.slow
 def test_seconds_to_decode_are_cpu_time_of_the_decoder_alone():
     """Neither waiting in the decoder nor measuring counts; on b1dc540 waiting did."""
 
