@@ -93,9 +93,9 @@ def test_a_copied_cache_is_read(called, package):
     assert called(package, "old.kernels") == (42, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ["nbi", "nbc"])
 @pytest.mark.parametrize("cut", [0, 1, 30, 0.5, 0.95])
-@pytest.mark.slow
 def test_a_file_cut_short_is_made_again(called, package, end, cut):
     (file,) = (package / "old" / "__pycache__").glob(f"*.{end}")
     whole = file.read_bytes()

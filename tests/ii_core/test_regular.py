@@ -93,7 +93,7 @@ def test_smallest_rectangle_inverts_exactly(lattice, pitch, offset, lenses, pixe
     assert mask.sum() == owned.sum()  # each pixel stands in the rectangle of its one lens
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     st.sampled_from(["rectangular", "hexagonal"]),
     st.tuples(*[st.sampled_from([1.0, 2.0, 3.0, 4.5, 6.0, 7.3])] * 2),
