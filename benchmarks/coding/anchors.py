@@ -40,6 +40,7 @@ RECORDS = Records("anchors", ("benchmarks.coding.anchors", "benchmarks.coding.li
 PHOTOGRAPHS = {reference.name: reference for reference in profile("photographs").pictures}
 SINGLE = ("astronaut", "chelsea", "coffee")  # of scikit-image
 AVIF = "si-avif:best"
+BEST = f"{OURS}:best"
 JPLM = "jplm"  # transforms over all views: of flowers, smaller ones were never chosen, and took 17 times as long
 QUANTISERS = {
     OURS: (33, 39, 45, 51, 57),
@@ -55,6 +56,7 @@ QUANTISERS = {
 BY_RATE = "si-jpeg2000"  # its quantisers are rates in bpp
 OF_SINGLE = (29, 34, 39, 44, 49)  # of `si-lf` for a view alone: the first of many is finer than the rest
 OTHERS = ("svtav1", "jpegxl", BY_RATE, JPLM)
+VIDEO = ("vvenc", "libaom", "x265")
 SCHEMES = (OURS, BY_RGB, AVIF, "x265", "vvenc", "libaom")
 MEASURES = {"ctc": "q_ctc_psnr", "psnr": "q_global", "ssim": "q_ctc_ssim", "worst": "q_ctc_min", "step": "q_ctc_step"}
 LUMA = "luma"  # PSNR of Y in the codes of the common test conditions, mean over views
@@ -65,7 +67,7 @@ def main() -> None:
     """Measure, print, record and fill the page."""
     views = [f"{name}-5x5" for name in PHOTOGRAPHS]
     single = [f"{name}-1x1" for name in (*PHOTOGRAPHS, *SINGLE)]
-    parser = command_line(__doc__, pictures=(*views, *single, *SCENES, *FIELDS), schemes=(*SCHEMES, *OTHERS))
+    parser = command_line(__doc__, pictures=(*views, *single, *SCENES, *FIELDS), schemes=(*SCHEMES, BEST, *OTHERS))
     parser.add_argument("--photographs", type=Path, help="folder of the benchmark's photographs")
     asked = parser.parse_args()
     keys = [{"picture": name, "scheme": scheme} for name in asked.pictures for scheme in asked.schemes]
@@ -135,14 +137,16 @@ def luma_psnr(original: IIPicture, decoded: IIPicture, own: Any = None) -> float
     return float((20 * np.log10(PEAK) - 10 * np.log10(np.maximum(error, 1e-6))).mean())
 
 
-def changes(rows: Sequence[Mapping[str, Any]], names: Sequence[str], scheme: str) -> dict[str, dict[str, float]]:
-    """Return Bjøntegaard rates of `si-lf` against a scheme by measure and picture.
+def changes(
+    rows: Sequence[Mapping[str, Any]], names: Sequence[str], scheme: str, of: str = OURS
+) -> dict[str, dict[str, float]]:
+    """Return Bjøntegaard rates of `si-lf`, or of another scheme, against a scheme by measure and picture.
 
     By CTC and luma `si-lf` is tuned for CTC, by RGB for RGB.
     """
     curves = {(row["picture"], row["scheme"]): row["points"] for row in rows}
     found: dict[str, dict[str, float]] = {}
-    for measure, ours in (("ctc", OURS), (LUMA, OURS), ("psnr", BY_RGB), ("worst", OURS)):
+    for measure, ours in (("ctc", of), (LUMA, of), ("psnr", BY_RGB), ("worst", of)):
         pairs = {name: (curves.get((name, scheme)), curves.get((name, ours))) for name in names}
         rates = {name: rate_change(*pair, measure) for name, pair in pairs.items() if None not in pair}
         found[measure] = {name: rate for name, rate in rates.items() if rate is not None}
@@ -150,12 +154,16 @@ def changes(rows: Sequence[Mapping[str, Any]], names: Sequence[str], scheme: str
 
 
 def comparison(
-    rows: Sequence[Mapping[str, Any]], names: Sequence[str], others: Sequence[str], labels: Mapping[str, str] = LABELS
+    rows: Sequence[Mapping[str, Any]],
+    names: Sequence[str],
+    others: Sequence[str],
+    labels: Mapping[str, str] = LABELS,
+    of: str = OURS,
 ) -> list[str]:
     """Return a table of Bjøntegaard rates by picture, their mean and the worst; without columns that are empty."""
     measured = {row["picture"]: row for row in rows}
     shown = [name for name in names if name in measured]
-    each = {other: changes(rows, shown, other) for other in others}
+    each = {other: changes(rows, shown, other, of) for other in others}
     columns = [(other, measure) for other in others for measure in labels if each[other][measure]]
     heads = [f"{labels[measure]}: `{other}`" for other, measure in columns]
     lines = []
@@ -203,10 +211,10 @@ def tables() -> Tables:
     """Return the tables of docs/benchmark.md."""
     rows = RECORDS.rows()
     kinds = {
-        "anchors-photographs": ([f"{name}-5x5" for name in PHOTOGRAPHS], ("vvenc", "libaom", "x265")),
+        "anchors-photographs": ([f"{name}-5x5" for name in PHOTOGRAPHS], VIDEO),
         "anchors-others": ([f"{name}-5x5" for name in PHOTOGRAPHS], OTHERS),
         "anchors-single": ([f"{name}-1x1" for name in (*PHOTOGRAPHS, *SINGLE)], ("libaom", AVIF)),
-        "anchors-scenes": ([*SCENES, *FIELDS], ("vvenc", "libaom", "x265")),
+        "anchors-scenes": ([*SCENES, *FIELDS], VIDEO),
     }
     found = {}
     for mark, (names, others) in kinds.items():
@@ -217,4 +225,13 @@ def tables() -> Tables:
         found["docs/benchmark.md", mark] = lines
     names, others = kinds["anchors-photographs"]
     found["docs/benchmark.md", "anchors-views"] = by_view(rows, names, others)
+    best = [row for row in rows if row["scheme"] == BEST]
+    used = [row for row in rows if row["picture"] in {row["picture"] for row in best}]
+    labels = {measure: LABELS[measure] for measure in ("ctc", LUMA)}
+    lines = (
+        [*comparison(used, names, (OURS, *others), labels, of=BEST), "", origin(best)]
+        if best
+        else ["Not measured yet."]
+    )
+    found["docs/benchmark.md", "anchors-best"] = lines
     return found

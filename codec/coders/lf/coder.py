@@ -49,7 +49,8 @@ GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below whic
 # Views of more samples than so many are smoother, and their blocks cheaper: there GOOD is less by their share.
 GOOD_SAMPLES = 128 * 64
 SURELY = 5.0, 5.0, 2.0  # times GOOD: intra modes are not tried below it
-FIRST_ESTIMATES, FIRST_TRIES = 8, 3  # intra modes of the first view that are compared by coefficients, coded on trial
+# intra modes of the first view that are compared by coefficients and coded on trial, by effort
+FIRST_ESTIMATES, FIRST_TRIES = (0, 8, 20), (1, 3, 8)
 HALVINGS = 0, 1, 2  # of squares of blocks
 BLEND_ROWS = 4, 4, 1  # the kind of blending is chosen by every so many-th row
 WEIGHT = 0.12  # squared error a bit is worth, in squared steps
@@ -478,12 +479,13 @@ class Source:
             original=original,
             weight=np.float32(worth(job.step)),
             least=3 if effort == 0 else 2,
-            intra_tries=FIRST_TRIES if first else (1, 1, 3)[effort],
-            intra_estimates=FIRST_ESTIMATES if first else 0,
+            intra_tries=FIRST_TRIES[self.effort] if first else (1, 1, 3)[effort],
+            intra_estimates=FIRST_ESTIMATES[self.effort] if first else 0,
             halvings=HALVINGS[effort],
             good=np.float32(GOOD[effort] * share),
             surely=np.float32(SURELY[effort]),
             planes=1 if effort == 0 else 3,
+            promising=int(self.effort < 2),
             hurried=int(effort < 2),
         )
 

@@ -59,6 +59,8 @@ class Search(NamedTuple):
         and of how many they are the best by their coefficients; 0: of all by sums of magnitudes.
     planes : int
         Planes that count in the choice of disparity and references.
+    promising : int
+        Whether only those transforms of an intra block are tried whose estimated cost is low.
     hurried : int
         Whether intra directions are found coarse to fine, and sizes and disparities that hardly ever pay left out.
     halvings : int
@@ -75,6 +77,7 @@ class Search(NamedTuple):
     intra_tries: Any
     intra_estimates: Any
     planes: Any
+    promising: Any
     hurried: Any
     halvings: Any
     good: Any
@@ -153,7 +156,7 @@ def _best_transform(costs, job, search, work, trial, y0, x0, shape, mode, best):
     for p in range(3):
         predict_direction(job, work, p, y0, x0, shape, mode)
     most = HUGE
-    if search.hurried or search.intra_estimates:
+    if search.promising:
         most = PROMISING * estimated_cost(job, search, work, y0, x0, shape, np.int64(0), np.int64(1))
     for transform in range(1, 4):
         if most < HUGE and estimated_cost(job, search, work, y0, x0, shape, transform, np.int64(1)) > most:
