@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from skimage import data
 
 from codec import decode, encode
 from codec.coders.lf import (
@@ -21,7 +22,7 @@ from codec.coders.lf import (
 from codec.coders.lf import coder as lf
 from codec.contract import checked_options
 from ii_core import IIPicture, sub_images
-from metrics import q_ctc_psnr, q_global
+from metrics import bd_rate, q_ctc_psnr, q_global
 from tests.codec.test_lf import shifted_plane
 from tests.support.slow import first_fast
 
@@ -462,3 +463,13 @@ def test_the_first_view_is_finer_the_more_views_it_predicts_and_a_view_alone_is_
         first.append(steps[0])
     assert first[0] == 128 * 2**3 and sorted(first, reverse=True) == first
     assert 8 < 6 * np.log2(first[0] / first[-1]) < 12
+
+
+@pytest.mark.slow
+def test_the_preset_best_needs_less_of_a_single_view():
+    grey = data.camera()[100:292, 100:292]
+    picture, curves = IIPicture(np.repeat(grey[..., None], 3, axis=2), grey.shape, (1, 1)), {}
+    for scheme in ("si-lf", "si-lf:best"):
+        files = [encode(picture, scheme, qp=qp) for qp in (30, 36, 42, 48)]
+        curves[scheme] = [coded.bpp for coded in files], [q_global(picture, decode(coded)) for coded in files]
+    assert bd_rate(*curves["si-lf"], *curves["si-lf:best"]) < -0.5
