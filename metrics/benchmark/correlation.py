@@ -28,8 +28,8 @@ def rank_correlations(profile: Profile, results: Sequence[Mapping[str, Any]]) ->
     if len(results) < LEAST_CODERS:
         return {}
     found: dict[tuple[str, str], list[float]] = {}
-    for i in range(len(profile.pictures)):
-        for points in zip(*(result["pictures"][i]["points"] for result in results), strict=True):
+    for pictures in zip(*(result["pictures"] for result in results), strict=True):
+        for points in zip(*(picture["points"] for picture in pictures), strict=True):
             if not all(point["reached"] for point in points):
                 continue
             ranks = {name: _ranks([point.get(name, math.nan) for point in points], name) for name in profile.measures}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import math
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -152,6 +152,19 @@ class Profile:
     def meets(self, bpp: float, target: float) -> bool:
         """Return whether a rate counts as that target."""
         return bpp <= target * (1 + self.rate_tolerance)
+
+    def only(self, names: Iterable[str]) -> Profile:
+        """Return the profile with some of its pictures, in its order.
+
+        Raises
+        ------
+        ValueError
+            If no picture has a name.
+        """
+        asked, known = set(names), [reference.name for reference in self.pictures]
+        if unknown := sorted(asked - set(known)):
+            raise ValueError(f"{self.name} has no picture {unknown[0]!r}: known are {', '.join(known)}")
+        return replace(self, pictures=tuple(one for one in self.pictures if one.name in asked))
 
 
 def profile_names() -> dict[str, str]:

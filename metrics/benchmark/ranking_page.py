@@ -66,10 +66,12 @@ def conditions(profile: Profile, rows: Rows) -> str:
     photographs = any(reference.source for reference in profile.pictures)
     noise = "that of the cameras" if photographs else "none, rendered pictures"
     rates = ", ".join(f"{rate:g}" for rate in profile.rates_bpp)
+    count, all_ = len(pictures), len(profile.pictures)
+    some = "" if count == all_ else f"; only {count} of its {all_} pictures"
     return (
         f"{sizes}. Depth: {depth} bit. Noise: {noise}. Targets: {rates} bpp; a file at most "
         f"{profile.rate_tolerance:.0%} larger meets one. Definition: {profile.name} version {profile.version}, "
-        f"SHA-256 {profile.digest[:12]}."
+        f"SHA-256 {profile.digest[:12]}{some}."
     )
 
 
@@ -101,12 +103,11 @@ def _differences(differences: Mapping[str, float], profile: Profile) -> str:
 
 def _pictures(profile: Profile, rows: Rows) -> Table:
     """Return the Bjøntegaard rates by the measure of the ranking: a row per coder, a column per picture."""
-    table = [["coder", *(reference.name for reference in profile.pictures)]]
+    names = [picture["name"] for picture in rows[0]["result"]["pictures"]]
+    table = [["coder", *names]]
     for row in rows:
         found = row["differences"][profile.rank_by]
-        table.append(
-            [str(row["coder"]), *(f"{found[p.name]:+.1f} %" if p.name in found else "–" for p in profile.pictures)]
-        )
+        table.append([str(row["coder"]), *(f"{found[name]:+.1f} %" if name in found else "–" for name in names)])
     return table
 
 
@@ -228,7 +229,7 @@ def _write_numbers(path: Path, profile: Profile, rows: Rows) -> None:
 
 def _chart(profile: Profile, rows: Sequence[Mapping[str, Any]]) -> Any:
     """Return the figure: a panel per picture, a line per coder."""
-    count, measure = len(profile.pictures), measure_of(profile.rank_by)
+    count, measure = len(rows[0]["result"]["pictures"]), measure_of(profile.rank_by)
     across = min(3, count)
     down = -(-count // across)
     figure = new_figure(4.2 * across, 3.4 * down + 0.4)

@@ -45,6 +45,9 @@ def benchmark(
         Path | None,
         typer.Option(help="Folder of photographs, or of `raytrace-ii render --set benchmark`; rendered if none."),
     ] = None,
+    only: Annotated[
+        str | None, typer.Option(help="Some pictures of the profile, such as flowers,toys; all by default.")
+    ] = None,
     list_: Annotated[
         bool, typer.Option("--list", help="List the pictures of the profile, and where photographs are had.")
     ] = False,
@@ -77,6 +80,8 @@ def benchmark(
         return
     check_cluster(workers, dask, plugin)
     defined = profile_of(profile)
+    if only is not None:
+        defined = defined.only(only.split(","))
     if list_:
         for line in listing(defined, pictures):
             say(line)

@@ -56,10 +56,27 @@ def test_a_coder_is_run_and_ranked(run, tmp_path):
     }  # fmt: skip
 
 
+@pytest.mark.slow
+def test_some_pictures_are_run_and_ranked_among_themselves(run, tmp_path):
+    definition, cuboid = tmp_path / "tiny.toml", TINY[TINY.index("[[picture]]") :].replace("apples", "cuboid")
+    definition.write_text(TINY + cuboid)
+    for name, *how in (
+        ("a", "jpeg2000", "--only", "cuboid"), ("b", "jpeg", "--only", "cuboid"), ("c", "jpegxl"),
+    ):  # fmt: skip
+        assert run("benchmark", definition, "--scheme", *how, "-o", tmp_path / f"{name}.json")[0] == 0
+    a, b, c = (tmp_path / f"{name}.json" for name in "abc")
+    assert [row["name"] for row in json.loads(a.read_text())["pictures"]] == ["cuboid"]
+    assert run("ranking", definition, a, b, "-o", tmp_path / "rank.md")[0] == 0
+    assert "only 1 of its 2 pictures" in (tmp_path / "rank.md").read_text()
+    code, _, error = run("ranking", definition, a, c, "-o", tmp_path / "mixed.md")
+    assert code == 2 and f"{c} has other pictures than {a}" in error
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (("small",), "output is missing"),
+        (("small", "-o", "r.json", "--scheme", "jpeg", "--only", "apples,pears"), "small has no picture 'pears'"),
         (("small", "-o", "r.json"), "coder is missing: either --scheme, --anchor, --external"),
         (("small", "-o", "r.json", "--scheme", "h264"), "unknown scheme"),
         (("small", "-o", "r.json", "--scheme", "jpeg", "--workers", "0"), "workers is 0"),
