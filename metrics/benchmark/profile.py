@@ -159,7 +159,7 @@ class Profile:
         Raises
         ------
         ValueError
-            If no picture has a name.
+            If no picture has one of the names.
         """
         asked, known = set(names), [reference.name for reference in self.pictures]
         if unknown := sorted(asked - set(known)):

@@ -66,8 +66,8 @@ def conditions(profile: Profile, rows: Rows) -> str:
     photographs = any(reference.source for reference in profile.pictures)
     noise = "that of the cameras" if photographs else "none, rendered pictures"
     rates = ", ".join(f"{rate:g}" for rate in profile.rates_bpp)
-    count, all_ = len(pictures), len(profile.pictures)
-    some = "" if count == all_ else f"; only {count} of its {all_} pictures"
+    count, whole = len(pictures), len(profile.pictures)
+    some = "" if count == whole else f"; only {count} of its {whole} pictures"
     return (
         f"{sizes}. Depth: {depth} bit. Noise: {noise}. Targets: {rates} bpp; a file at most "
         f"{profile.rate_tolerance:.0%} larger meets one. Definition: {profile.name} version {profile.version}, "
