@@ -1,4 +1,4 @@
-"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 12: the same bytes decode to the same pixels on every machine.
+"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 13: the same bytes decode to the same pixels on every machine.
 
 In ``tests/golden/lf.zip``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
@@ -8,8 +8,9 @@ views of *Apples* at quantiser 26; the first encoder that left out transforms wr
 views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. ``dependent.ii``, of
 version 8, ``directed.ii``, of version 9, and ``parted.ii``, of version 10, hold 5×4 of those views of 46×35 pixels at
 quantiser 32. ``rigged.ii``, of version 11, holds `moved_planes` of `test_lf_tuning`, 3×4 views of 72×64 pixels at
-quantiser 36; ``refined.ii``, of version 12, such views with noise, at quantiser 30. The decoder has integer
-arithmetic alone, so that a hash of the pixels is the expectation.
+quantiser 36; ``refined.ii``, of version 12, such views with noise, at quantiser 30; ``limited.ii``, of version 13,
+3×4 views of 88×72 pixels with bars, at quantiser 32. The decoder has integer arithmetic alone, so that a hash of the
+pixels is the expectation.
 """
 
 import contextlib
@@ -27,6 +28,7 @@ import pytest
 from codec import Encoded, decode
 from codec.coders.lf import stream
 from codec.coders.lf.field import Field
+from codec.coders.lf.loop_filter import OWN
 from codec.coders.lf.pyramid import ALIKE, NEAREST, _spread, pyramid
 from codec.coders.lf.state import CODED, DIRECTION, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS, TALL, WIDE
 from ii_core.base.jit import lean_kernel, part_kernel
@@ -43,6 +45,7 @@ PIXELS = {
     "parted": "4fed4243261259d830d4fb3764e1c4d2ab4062f7e87ff84fe47535170d7c80a9",
     "rigged": "b9bd647343a6ee5bd856526e9af14e8691de67989ee53125ff71c11f53b8391f",
     "refined": "f50066bc34f045614162d0f107263d80257350780e91125f6845f0af951d54ab",
+    "limited": "714a575b532c883f21933a0725f6bdcab75465cb8b3cd53b5f7c71e8c3dac885",
     "row": "8779e10e45bc0ef8e8a3921c5f3ed192d0b0dad3092e0d9619ae1a54c87281c0",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
@@ -59,6 +62,7 @@ VERSIONS = {
     "parted": stream.PARTED,
     "rigged": stream.RIGGED,
     "refined": stream.REFINED,
+    "limited": stream.LIMITED,
 }
 
 
@@ -93,7 +97,7 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
 
 def test_versions_are_the_numbers_in_the_streams():
     numbers = stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED
-    assert (*numbers, *stream.FLAGGED) == (2, 3, 5, 6, 7, 8, 9, 10, 11, 12)
+    assert (*numbers, *stream.FLAGGED) == (2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13)
 
 
 def test_the_third_stream_has_blocks_without_a_transform(monkeypatch):
@@ -176,6 +180,24 @@ def test_the_tuned_stream_has_filters_of_several_kinds(monkeypatch):
     monkeypatch.setattr(Field, "code", noting)
     decode(Encoded.load(FOLDER / "tuned.ii"))
     assert {(0, False), (1, False), (2, False), (2, True)} <= set(found)
+
+
+def test_the_limited_stream_has_limited_differences(monkeypatch):
+    """Filters of one class and of several with such taps: read as version 12, another picture or none."""
+    modes, code = set(), Field.code
+
+    def noting(field, coder, job, work, *same):
+        code(field, coder, job, work, *same)
+        if field.filters.taps[job.at, 0, :, OWN:].any():
+            modes.add(int(field.filters.modes[job.at, 0]))
+
+    coded = Encoded.load(FOLDER / "limited.ii")
+    monkeypatch.setattr(Field, "code", noting)
+    decode(coded)
+    assert modes == {1, 2}
+    with contextlib.suppress(ValueError):
+        older = decode(replace(coded, payload=bytes([stream.REFINED]) + coded.payload[1:])).pixels
+        assert digest(older) != PIXELS["limited"]
 
 
 def test_the_lossy_stream_has_factors_between_planes():

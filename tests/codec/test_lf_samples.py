@@ -63,7 +63,7 @@ def test_decoding_repeats_the_encoder_to_the_bit(dtype, options):
     picture = specks(dtype, grid=(3, 4), lenses=(19, 10))
     source = lf.Source(picture, checked_options(lf.LightField(), options))
     payload, field = source.coded(30 * lf.FRACTIONS)
-    assert payload[0] == stream.REFINED
+    assert payload[0] == stream.LIMITED
     shown = np.empty_like(picture.pixels)
     field.show(shown)
     coded = encode(picture, "si-lf:cross=0" if options else "si-lf", qp=30)
@@ -205,7 +205,7 @@ def test_halves_fit_bars():
     pixels = np.repeat(np.repeat(bars, 24, axis=0)[..., None], 3, axis=2).astype(np.uint8)
     picture = IIPicture(np.ascontiguousarray(pixels), pixels.shape[1::-1], (1, 1))
     source = lf.Source(picture, checked_options(lf.LightField(), {}))
-    source.header = replace(source.header, refined=False)
+    source.header = replace(source.header, refined=False, limited=False)
     halved, _ = source.coded(30 * lf.FRACTIONS)
     source.header = replace(source.header, parted=False)
     squares, _ = source.coded(30 * lf.FRACTIONS)

@@ -235,7 +235,7 @@ def test_views_beside_their_places_are_predicted(monkeypatch):
     picture = moved_planes(entries)
     source = lf.Source(picture, checked_options(lf.LightField(), {}))
     payload, field = source.coded(32 * lf.FRACTIONS)
-    assert payload[0] == stream.REFINED and payload[1] & 128
+    assert payload[0] == stream.LIMITED and payload[1] & 128
     found = rig.unpack(source.header.rig, 25, 12)
     shown = np.empty_like(picture.pixels)
     field.show(shown)
@@ -255,7 +255,7 @@ def test_views_in_their_places_have_no_rig(places):
     assert not lf.Source(picture, checked_options(lf.LightField(), {})).header.rig
 
 
-def filtered_by_definition(view, modes, taps):
+def filtered_by_definition(view, modes, taps, limit):
     """The filter by its definition in docs/lf.md, with arrays shifted as a whole."""
     planes_, (height, width) = view.astype(np.int64), view.shape[1:]
 
@@ -273,11 +273,15 @@ def filtered_by_definition(view, modes, taps):
     bins = np.minimum(sum(moved(across, i, 0) for i in range(-2, 3)) // 8, 4095)
     below = np.searchsorted(np.sort(bins, axis=None), bins)  # samples of lower bins
     classes = np.minimum(8 * below // bins.size, 7)
+    limited = [
+        sum(np.clip(moved(planes_[0], *by) - planes_[0], -limit, limit) for by in (pair, (-pair[0], -pair[1])))
+        for pair in pairs
+    ]
     out = view.copy()
     for p, mode in enumerate(modes):
         if mode:
             odd = [moved(planes_[p], *by) - moved(planes_[p], -by[0], -by[1]) for by in pairs[:2]]
-            found = even(planes_[p]) + odd + (even(planes_[0]) if p else [])
+            found = even(planes_[p]) + odd + (even(planes_[0]) if p else limited)
             weights = taps[p].astype(np.int64)[classes * (0, 1, 4, 8)[mode] // 8]
             total = sum(weights[..., i] * difference for i, difference in enumerate(found))
             out[p] = np.clip(planes_[p] + ((total + 128) >> 8), -8191, 8191)
@@ -286,7 +290,8 @@ def filtered_by_definition(view, modes, taps):
 
 @pytest.mark.parametrize("modes", [(1, 2, 3), (3, 1, 2), (2, 3, 0), (0, 0, 1), (3, 3, 3)])
 @pytest.mark.parametrize("shape", [(4, 4), (8, 20)])
-def test_a_view_is_filtered_as_defined(modes, shape):
+@pytest.mark.parametrize("limit", [0, 300])
+def test_a_view_is_filtered_as_defined(modes, shape, limit):
     rng = np.random.default_rng(sum(modes))
     smooth = np.add.outer(np.arange(shape[0]) ** 2, 9 * np.arange(shape[1]))
     views = (smooth + rng.integers(-800, 800, (2, 3, *shape))).astype(np.int16)
@@ -294,14 +299,15 @@ def test_a_view_is_filtered_as_defined(modes, shape):
     filters = loop_filter.new_filters(2)
     filters.modes[1] = modes
     filters.taps[1] = rng.integers(-127, 128, filters.taps[1].shape)
-    expected = filtered_by_definition(views[1], modes, filters.taps[1])
+    expected = filtered_by_definition(views[1], modes, filters.taps[1], limit)
     other = views[0].copy()
-    loop_filter.filter_view(views, 1, filters, *loop_filter.memory(*shape))
+    loop_filter.filter_view(views, 1, filters, np.int32(limit), *loop_filter.memory(*shape))
     np.testing.assert_array_equal(views[1], expected)
     np.testing.assert_array_equal(views[0], other)
 
 
-def test_filters_are_read_as_they_were_written():
+@pytest.mark.parametrize("limited", [0, 1])
+def test_filters_are_read_as_they_were_written(limited):
     """Several views: not filtered, with new filters in each precision, and with those before."""
     rng = np.random.default_rng(9)
     written, read = loop_filter.new_filters(12), loop_filter.new_filters(12)
@@ -310,13 +316,13 @@ def test_filters_are_read_as_they_were_written():
         same = int(rng.integers(8)) if view else 0
         for p in range(3):
             mode = written.modes[view, p] = rng.integers(4)
-            taps, shift = loop_filter.TAPS if p else loop_filter.OWN, int(rng.integers(4))
+            taps, shift = loop_filter.TAPS if p or limited else loop_filter.OWN, int(rng.integers(4))
             values = rng.integers(-(127 >> shift), (127 >> shift) + 1, (loop_filter.COUNTS[mode], taps)) << shift
             written.taps[view, p, : len(values), :taps] = values
-        loop_filter.code_filter(coder, written, view, same)
+        loop_filter.code_filter(coder, written, view, same, limited)
     reader = arithmetic.reader(contexts.starting_contexts(), arithmetic.finish(coder))
     for view in range(12):
-        loop_filter.code_filter(reader, read, view, 0)
+        loop_filter.code_filter(reader, read, view, 0, limited)
     for one, other in zip(written, read, strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -328,15 +334,31 @@ def test_least_squares_undo_a_blur_and_the_gain_is_the_error_that_they_save():
     views = ((4 * original.astype(int) + sums) // 8).astype(np.int16)[None]
     before = np.square(views[0].astype(float) - original).sum(axis=(1, 2))
     weight = 2000.0
-    found = loop_filter_search.search_filters(views, 0, original, weight)
+    found = loop_filter_search.search_filters(views, 0, original, np.int32(0), weight)
     filters = loop_filter.new_filters(1)
     filters.modes[0], filters.taps[0] = found.modes, found.taps
-    loop_filter.filter_view(views, 0, filters, *loop_filter.memory(40, 48))
+    loop_filter.filter_view(views, 0, filters, np.int32(0), *loop_filter.memory(40, 48))
     saved = before - np.square(views[0].astype(float) - original).sum(axis=(1, 2))
     assert (saved > 0.4 * before).all()
     # Bits of three filters of 8 to 14 taps lie between 10 and 2000; rounding adds 1/12 a sample.
     assert ((saved - np.array(found.gains)) / weight > 10).all()
     assert ((saved - np.array(found.gains)) / weight < 2000).all()
+
+
+def test_limited_differences_take_noise_beside_an_edge_and_leave_the_edge():
+    """Rings of 1600 with noise of 16: a filter with limited differences leaves a third of what others leave."""
+    rng = np.random.default_rng(3)
+    rings = np.hypot(*np.mgrid[-24:24, -32:32]) % 24 < 12
+    original = np.stack([np.where(rings, 800, -800)] * 3).astype(np.int16)
+    noisy = (original + np.rint(rng.normal(0, 16, original.shape))).astype(np.int16)
+    left = []
+    for limit in np.int32(0), np.int32(40):
+        views, filters = noisy[None].copy(), loop_filter.new_filters(1)
+        found = loop_filter_search.search_filters(views, 0, original, limit, 1.0)
+        filters.modes[0], filters.taps[0] = found.modes, found.taps
+        loop_filter.filter_view(views, 0, filters, limit, *loop_filter.memory(48, 64))
+        left.append(np.square(views[0, 0].astype(float) - original[0]).sum())
+    assert left[1] < left[0] / 3
 
 
 def smooth_plane(grid, height, width):

@@ -289,6 +289,7 @@ class Source:
             directed=not exact,
             parted=not exact,
             refined=not exact,
+            limited=not exact,
             rig=b"" if entries is None else rig.pack(entries, self.grid[0] // 2 * self.grid[1] + self.grid[1] // 2),
             steps=(),
         )
@@ -456,7 +457,8 @@ class Source:
         search.find_blocks(costs, job, self._search(job, original))
         filters = None
         if field.header.filtered:
-            filters = loop_filter_search.search_filters(field.views, job.at, original, worth(job.step))
+            limit = field.limit(job.step)
+            filters = loop_filter_search.search_filters(field.views, job.at, original, limit, worth(job.step))
         return job, made, filters
 
     def _target(self, field: Field, node: Node) -> NDArray[np.int16]:

@@ -115,7 +115,7 @@ class Field:
         """
         code_view(coder, job, work)
         if self.header.filtered:
-            loop_filter.code_filter(coder, self.filters, job.at, same)
+            loop_filter.code_filter(coder, self.filters, job.at, same, int(self.header.limited))
         if self.header.exact:
             exact = self._exact
             rotation, sixteen = self.header.colours, exact.pixels.itemsize == 2
@@ -124,6 +124,10 @@ class Field:
             code_exact(coder, exact)
             self.pixels[job.at] = exact.pixels
             gather(exact.pixels, (1, 1), 0, 0, rotation, sixteen, self.views[job.at])
+
+    def limit(self, step: int) -> np.int32:
+        """Of a loop filter's limited differences, at a quantiser's step: a quarter of it; 0 without them."""
+        return np.int32(max(step >> 6, 1) if self.header.limited else 0)
 
     def view_pixels(self, number: int) -> NDArray[Any]:
         """A decoded view, (H, W, 3)."""
@@ -143,7 +147,9 @@ class Field:
     def refine(self, node: Node, job: Job, made: Synthesis) -> None:
         """Filter a decoded view, and note its disparity, for those that follow."""
         if self.header.filtered and self.filters.modes[job.at].any():
-            loop_filter.filter_view(self.views, job.at, self.filters, *loop_filter.memory(*self.shape))
+            loop_filter.filter_view(
+                self.views, job.at, self.filters, self.limit(job.step), *loop_filter.memory(*self.shape)
+            )
         if (node.row, node.col) not in self.used or not (len(made.sources) or self.past):
             return
         synthesis.start(made, job.at, job.blocks, job.unit, job.synthesised)

@@ -1,9 +1,10 @@
 """In-loop filter of a decoded view, by plane: symmetric and odd taps, of samples that are classed by activity.
 
 After Wiener filters in video coding (Tsai et al. 2013, adaptive loop filter). A filter adds to a sample
-``(Σ tap · difference + 128) >> 8``. Differences are those of two opposite neighbours' sum from twice the sample
-(`EVEN`), of two opposite neighbours (`ODD`: they move a plane by parts of a sample), and, in the second and third
-plane, of the first plane's neighbours. All planes are filtered from the decoded ones before any filter.
+``(Σ tap · difference + 128) >> 8``. Differences are those of two opposite neighbours' sum from twice the sample,
+of two opposite neighbours (they move a plane by parts of a sample), in the second and third plane, of the first
+plane's neighbours, and in the first plane those of neighbours from the sample, each limited: they smooth beside an
+edge and leave the edge. All planes are filtered from the decoded ones before any filter.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from .arithmetic import code_bit, code_number, code_raw
 from .blocks import LIMIT
 from .warp import clamped
 
-# Offsets (down, across) of pairs: six even, two odd, and six even in the first plane: `_differences` lists them.
+# Six even pairs, two odd ones, and six even of the first plane; limited ones of itself, from version 13 on.
+# `_differences` lists them.
 TAPS, OWN = 14, 8
 GROUPS = np.array([0, 0, 1, 1, 1, 1, 2, 2, 3, 3, 3, 3, 3, 3])  # of contexts, by tap
 CLASSES = 8
@@ -62,8 +64,11 @@ def new_filters(views: int) -> Filters:
 
 
 @lean_kernel
-def code_filter(coder, filters, view, same):
-    """Write or read the filters of a view; bit p of ``same`` says that of plane p is the one coded last."""
+def code_filter(coder, filters, view, same, limited):
+    """Write or read the filters of a view; bit p of ``same`` says that of plane p is the one coded last.
+
+    ``limited`` says whether the first plane has limited differences.
+    """
     modes, taps = filters.modes, filters.taps
     for p in range(3):
         latest = filters.latest[p]
@@ -82,12 +87,13 @@ def code_filter(coder, filters, view, same):
             if several:
                 several += code_bit(coder, np.int64(at.FILTER_CLASSES + 2 * p + 1), 1 if mode > 2 else 0)
             modes[view, p] = 1 + several
-            _code_taps(coder, taps[view, p], 1 if p else 0, 1 if several == 0 else 2 << several)
+            count, length = 1 if several == 0 else 2 << several, TAPS if p or limited else OWN
+            _code_taps(coder, taps[view, p], 1 if p else 0, count, length)
             filters.latest[p] = view
 
 
 @part_kernel
-def _code_taps(coder, taps, plane, count):
+def _code_taps(coder, taps, plane, count, length):
     """Write or read taps: the shift of all, and multiples of its power, as differences from the class before."""
     shift, ones = 0, np.int64(0)
     for k in range(count):
@@ -97,7 +103,7 @@ def _code_taps(coder, taps, plane, count):
         shift += 1
     shift = 2 * code_raw(coder, shift >> 1) + code_raw(coder, shift & 1)
     for k in range(count):
-        for i in range(TAPS if plane else OWN):
+        for i in range(length):
             context = at.TAP + (plane * 4 + GROUPS[i]) * 12
             expected = np.int64(taps[k - 1, i]) >> shift if k else np.int64(0)
             value = (np.int64(taps[k, i]) >> shift) - expected
@@ -108,7 +114,7 @@ def _code_taps(coder, taps, plane, count):
 
 
 @stage_kernel
-def _differences(planes, p, y, x, found):
+def _differences(planes, p, y, x, limit, found):
     """found[:TAPS] = differences of a sample's neighbours; y and x count from the border."""
     for half in range(2 if p else 1):
         plane, first = planes[0 if half else p], OWN * half
@@ -123,6 +129,20 @@ def _differences(planes, p, y, x, found):
         if not half:
             found[6] = np.int32(row[x + 1]) - row[x - 1]
             found[7] = np.int32(below[x]) - above[x]
+            if p == 0:
+                own, outer = row[x], plane[y - 2]
+                found[8] = _limited(row[x - 1], own, limit) + _limited(row[x + 1], own, limit)
+                found[9] = _limited(above[x], own, limit) + _limited(below[x], own, limit)
+                found[10] = _limited(above[x - 1], own, limit) + _limited(below[x + 1], own, limit)
+                found[11] = _limited(above[x + 1], own, limit) + _limited(below[x - 1], own, limit)
+                found[12] = _limited(row[x - 2], own, limit) + _limited(row[x + 2], own, limit)
+                found[13] = _limited(outer[x], own, limit) + _limited(plane[y + 2, x], own, limit)
+
+
+@stage_kernel
+def _limited(other, own, limit):
+    """Difference of two samples, of the limit's magnitude at most."""
+    return min(max(np.int32(np.int32(other) - own), -limit), limit)
 
 
 @part_kernel
@@ -170,7 +190,7 @@ def prepare_view(views, view, planes, activity, classes, bins):
 
 
 @lean_kernel
-def filter_view(views, view, filters, planes, activity, classes, bins):
+def filter_view(views, view, filters, limit, planes, activity, classes, bins):
     """Filter a decoded view.
 
     Parameters
@@ -178,6 +198,8 @@ def filter_view(views, view, filters, planes, activity, classes, bins):
     views : ndarray of int16, (J, 3, H, W)
     view : int
     filters : Filters
+    limit : int32
+        Of limited differences; with 0 they are 0.
     planes : ndarray of int16, (3, H + 4, W + 4)
         Memory, as all that follows.
     activity : ndarray of int32, (2, H, W)
@@ -194,9 +216,9 @@ def filter_view(views, view, filters, planes, activity, classes, bins):
             shift = 3 if mode == 1 else 3 - mode
             for y in range(height):
                 for x in range(width):
-                    _differences(planes, p, y + BORDER, x + BORDER, found)
+                    _differences(planes, p, y + BORDER, x + BORDER, limit, found)
                     own, total = taps[classes[y, x] >> shift], np.int32(128)
-                    for i in range(TAPS if p else OWN):
+                    for i in range(TAPS):
                         total += np.int32(own[i]) * found[i]
                     value = np.int32(planes[p, y + BORDER, x + BORDER]) + (total >> 8)
                     views[view, p, y, x] = min(max(value, -LIMIT), LIMIT)

@@ -17,7 +17,6 @@ from .loop_filter import (
     CLASSES,
     COUNTS,
     MOST_TAP,
-    OWN,
     TAPS,
     Filters,
     _differences,
@@ -66,32 +65,33 @@ class Found(NamedTuple):
 
 
 @lean_kernel
-def _add_moments(views, view, original, planes, activity, classes, bins, products, missed, counts, row):
+def _add_moments(views, view, original, limit, planes, activity, classes, bins, products, missed, counts, row):
     height, width = classes.shape
     prepare_view(views, view, planes, activity, classes, bins)
     found = bins[BINS:]
     for p in range(3):
-        taps = TAPS if p else OWN
         for y in range(height):
             for x in range(width):
                 k = np.int64(classes[y, x])
-                _differences(planes, p, y + BORDER, x + BORDER, found)
-                for i in range(taps):
+                _differences(planes, p, y + BORDER, x + BORDER, limit, found)
+                for i in range(TAPS):
                     row[i] = found[i]
                 error = np.float64(original[p, y, x] - views[view, p, y, x])
                 if p == 0:
                     counts[k] += 1
-                for i in range(taps):
+                for i in range(TAPS):
                     value, into = row[i], products[p, k, i]
                     missed[p, k, i] += value * error
-                    for j in range(taps):
+                    for j in range(TAPS):
                         into[j] += value * row[j]
 
 
-def search_filters(views: NDArray[np.int16], view: int, original: NDArray[np.int16], weight: float) -> Found:
+def search_filters(
+    views: NDArray[np.int16], view: int, original: NDArray[np.int16], limit: np.int32, weight: float
+) -> Found:
     """Return the best new filters of a decoded view; ``weight`` is the squared error that a bit is worth."""
     moments = Moments(np.zeros((3, CLASSES, TAPS, TAPS)), np.zeros((3, CLASSES, TAPS)), np.zeros(CLASSES))
-    _add_moments(views, view, original, *memory(*views.shape[2:]), *moments, np.zeros(TAPS))
+    _add_moments(views, view, original, limit, *memory(*views.shape[2:]), *moments, np.zeros(TAPS))
     modes, taps, gains = [], np.zeros((3, CLASSES, TAPS), np.int64), []
     for p in range(3):
         best: Best = (0.0, 0, taps[p])
@@ -102,7 +102,7 @@ def search_filters(views: NDArray[np.int16], view: int, original: NDArray[np.int
                 break
         gains.append(best[0])
         modes.append(best[1])
-        taps[p, : len(best[2]), : best[2].shape[1]] = best[2]
+        taps[p, : len(best[2])] = best[2]
     return Found(moments, modes, taps, gains)
 
 
@@ -131,9 +131,9 @@ def _better_of(moments: Moments, p: int, mode: int, weight: float, best: Best) -
 
 
 def _merged(moments: Moments, p: int, mode: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    taps, count = TAPS if p else OWN, COUNTS[mode]
-    products = moments.products[p, :, :taps, :taps].reshape(count, -1, taps, taps).sum(axis=1)
-    return products, moments.missed[p, :, :taps].reshape(count, -1, taps).sum(axis=1)
+    count = COUNTS[mode]
+    products = moments.products[p].reshape(count, -1, TAPS, TAPS).sum(axis=1)
+    return products, moments.missed[p].reshape(count, -1, TAPS).sum(axis=1)
 
 
 def _gain(
@@ -155,9 +155,7 @@ def choose_filters(coder: Arithmetic, filters: Filters, view: int, found: Found,
         if latest >= 0:
             mode = int(filters.modes[latest, p])
             products, missed = _merged(found.moments, p, mode)
-            gains[2] = (
-                _gain(products, missed, filters.taps[latest, p, : COUNTS[mode], : missed.shape[1]]) - on - again
-            )
+            gains[2] = _gain(products, missed, filters.taps[latest, p, : COUNTS[mode]]) - on - again
         way = int(np.argmax(gains))
         same |= (way == 2) << p
         filters.modes[view, p] = (0, found.modes[p], 1)[way]

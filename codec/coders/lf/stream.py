@@ -15,10 +15,10 @@ from .planes import bt709_colours
 # Versions 2, 3, 5 and 6 say by their number which tools they have: factors between planes, and residuals without a
 # transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent quantiser as well,
 # version 9 other intra modes, too, version 10 halved blocks, version 11 views beside their places, version 12 bits of
-# more contexts. Lossless coding still writes 2 and 3.
+# more contexts, version 13 limited differences in the loop filter. Lossless coding still writes 2 and 3.
 VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED = 3, 2, 5, 6
-TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED = 7, 8, 9, 10, 11, 12
-FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED
+TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED, LIMITED = 7, 8, 9, 10, 11, 12, 13
+FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED, LIMITED
 _VERSIONS = {
     (False, False): UNCROSSED,
     (True, False): VERSION,
@@ -27,7 +27,7 @@ _VERSIONS = {
 }
 _TOOLS = {version: tools for tools, version in _VERSIONS.items()}
 QUARTERS, EIGHTHS = 2, 3  # binary logarithms of the unit of factors between planes
-# Flags of versions 7 to 12; the lowest two bits are 0, or the logarithm of the factors' unit.
+# Flags from version 7 on; the lowest two bits are 0, or the logarithm of the factors' unit.
 _SKIPS, _FILTERS, _DOWN, _BT709, _SKEWED, _RIGGED = 4, 8, 16, 32, 64, 128
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
@@ -73,19 +73,21 @@ class Header:
     skipping : bool
         Whether small blocks may have a residual without a transform.
     tuned : bool
-        Versions 7 to 12: large coefficients have contexts by their neighbourhood, and views may be filtered.
+        From version 7 on: large coefficients have contexts by their neighbourhood, and views may be filtered.
     filtered : bool
         Whether views may be filtered in the loop.
     dependent : bool
-        Versions 8 to 12: the quantiser of coefficients is a dependent one.
+        From version 8 on: the quantiser of coefficients is a dependent one.
     directed : bool
-        Versions 9 to 12: intra blocks smooth borders, have contexts of directions, and transforms of sines.
+        From version 9 on: intra blocks smooth borders, have contexts of directions, and transforms of sines.
     parted : bool
-        Versions 10 to 12: squares of blocks may be halved.
+        From version 10 on: squares of blocks may be halved.
     refined : bool
-        Version 12: all bits with contexts are mixed, those of coefficients of more contexts.
+        From version 12 on: all bits with contexts are mixed, those of coefficients of more contexts.
+    limited : bool
+        Version 13: the loop filter of the first plane has limited differences.
     rig : bytes
-        Versions 11 and 12: departures of views from their places on the lattice, as `rig` packs them; may be empty.
+        From version 11 on: departures of views from their places on the lattice, as `rig` packs them; may be empty.
     steps : tuple of int
         The quantiser's step of each level, in 2^-7 of an 8-bit code.
     """
@@ -106,6 +108,7 @@ class Header:
     directed: bool = False
     parted: bool = False
     refined: bool = False
+    limited: bool = False
     rig: bytes = b""
     steps: tuple[int, ...]
 
@@ -127,7 +130,7 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
     flags |= _DOWN * (header.lattice[2] < 0) | _BT709 * (header.scales is not None) | _SKEWED * _skewed(header)
     flags |= _RIGGED * bool(header.rig)
     head = _TUNED.pack(
-        REFINED if header.refined else FLAGGED[header.dependent + header.directed + header.parted + bool(header.rig)],
+        _version(header),
         flags,
         header.log_stride | header.sources << 3,
         header.low,
@@ -137,6 +140,13 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
     head += _LATTICE.pack(*header.lattice) if _skewed(header) else b""
     head += leb128(len(header.rig)) + header.rig if header.rig else b""
     return head + b"".join(leb128(step) + leb128(length) for step, length in index)
+
+
+def _version(header: Header) -> int:
+    """Version of a payload with flags."""
+    if header.refined:
+        return LIMITED if header.limited else REFINED
+    return FLAGGED[header.dependent + header.directed + header.parted + bool(header.rig)]
 
 
 def _skewed(header: Header) -> bool:
@@ -249,6 +259,7 @@ def _read_tuned(payload: bytes) -> _Read:
         "directed": version >= DIRECTED,
         "parted": version >= PARTED,
         "refined": version >= REFINED,
+        "limited": version >= LIMITED,
         "rig": rig,
     }
     return values, index, at
