@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import lane_kernel, lane_part, lane_stage, lean_kernel, part_kernel
 
 from . import contexts as at
 from .arithmetic import code_bit, code_number, code_raw
@@ -30,6 +30,7 @@ BORDER = 2
 MOST_TAP = 127
 BINS = 4096
 BIN_SHIFT = 3
+ONE, TWO, THREE, FOUR = (np.uint64(i) for i in range(1, 5))
 
 
 class Filters(NamedTuple):
@@ -113,72 +114,76 @@ def _code_taps(coder, taps, plane, count, length):
             taps[k, i] = min(max((expected + size) << shift, -MOST_TAP), MOST_TAP)
 
 
-@stage_kernel
-def _differences(planes, p, y, x, limit, found):
-    """found[:TAPS] = differences of a sample's neighbours; y and x count from the border."""
-    for half in range(2 if p else 1):
-        plane, first = planes[0 if half else p], OWN * half
-        above, row, below = plane[y - 1], plane[y], plane[y + 1]
-        twice = 2 * np.int32(row[x])
-        found[first] = np.int32(row[x - 1]) + row[x + 1] - twice
-        found[first + 1] = np.int32(above[x]) + below[x] - twice
-        found[first + 2] = np.int32(above[x - 1]) + below[x + 1] - twice
-        found[first + 3] = np.int32(above[x + 1]) + below[x - 1] - twice
-        found[first + 4] = np.int32(row[x - 2]) + row[x + 2] - twice
-        found[first + 5] = np.int32(plane[y - 2, x]) + plane[y + 2, x] - twice
-        if not half:
-            found[6] = np.int32(row[x + 1]) - row[x - 1]
-            found[7] = np.int32(below[x]) - above[x]
-            if p == 0:
-                own, outer = row[x], plane[y - 2]
-                found[8] = _limited(row[x - 1], own, limit) + _limited(row[x + 1], own, limit)
-                found[9] = _limited(above[x], own, limit) + _limited(below[x], own, limit)
-                found[10] = _limited(above[x - 1], own, limit) + _limited(below[x + 1], own, limit)
-                found[11] = _limited(above[x + 1], own, limit) + _limited(below[x - 1], own, limit)
-                found[12] = _limited(row[x - 2], own, limit) + _limited(row[x + 2], own, limit)
-                found[13] = _limited(outer[x], own, limit) + _limited(plane[y + 2, x], own, limit)
+@lane_stage
+def find_differences(planes, p, y, limit, found):
+    """found[:TAPS, x] = differences of a row's samples from their neighbours; of their planes, rows have borders."""
+    plane = planes[p]
+    outer, above, row, below, last = plane[y], plane[y + 1], plane[y + 2], plane[y + 3], plane[y + 4]
+    _find_even(outer, above, row, below, last, found)
+    for i in range(found.shape[1]):
+        x = np.uint64(i)
+        found[6, x] = np.int32(row[x + THREE]) - np.int32(row[x + ONE])
+        found[7, x] = np.int32(below[x + TWO]) - np.int32(above[x + TWO])
+    if p:
+        plane = planes[0]
+        _find_even(plane[y], plane[y + 1], plane[y + 2], plane[y + 3], plane[y + 4], found[OWN:])
+    else:
+        for i in range(found.shape[1]):
+            x = np.uint64(i)
+            own = np.int32(row[x + TWO])
+            found[8, x] = _limited(row[x + ONE], own, limit) + _limited(row[x + THREE], own, limit)
+            found[9, x] = _limited(above[x + TWO], own, limit) + _limited(below[x + TWO], own, limit)
+            found[10, x] = _limited(above[x + ONE], own, limit) + _limited(below[x + THREE], own, limit)
+            found[11, x] = _limited(above[x + THREE], own, limit) + _limited(below[x + ONE], own, limit)
+            found[12, x] = _limited(row[x], own, limit) + _limited(row[x + FOUR], own, limit)
+            found[13, x] = _limited(outer[x + TWO], own, limit) + _limited(last[x + TWO], own, limit)
 
 
-@stage_kernel
+@lane_stage
+def _find_even(outer, above, row, below, last, found):
+    for i in range(found.shape[1]):
+        x = np.uint64(i)
+        twice = np.int32(2 * np.int32(row[x + TWO]))
+        found[0, x] = np.int32(np.int32(row[x + ONE]) + np.int32(row[x + THREE])) - twice
+        found[1, x] = np.int32(np.int32(above[x + TWO]) + np.int32(below[x + TWO])) - twice
+        found[2, x] = np.int32(np.int32(above[x + ONE]) + np.int32(below[x + THREE])) - twice
+        found[3, x] = np.int32(np.int32(above[x + THREE]) + np.int32(below[x + ONE])) - twice
+        found[4, x] = np.int32(np.int32(row[x]) + np.int32(row[x + FOUR])) - twice
+        found[5, x] = np.int32(np.int32(outer[x + TWO]) + np.int32(last[x + TWO])) - twice
+
+
+@lane_stage
 def _limited(other, own, limit):
     """Difference of two samples, of the limit's magnitude at most."""
-    return min(max(np.int32(np.int32(other) - own), -limit), limit)
+    return min(max(np.int32(np.int32(other) - own), np.int32(-limit)), limit)
 
 
-@part_kernel
-def prepare_view(views, view, planes, activity, classes, bins):
-    """Fill planes with a view and its border, and classes (H, W), by eighths of the samples in order of activity.
+@lane_part
+def with_border(views, view, planes):
+    """planes = a view and its border."""
+    height, width = views.shape[2:]
+    for p in range(3):
+        for y in range(height + 2 * BORDER):
+            row, into = views[view, p, clamped(y - BORDER, height)], planes[p, y]
+            for i in range(width):
+                into[np.uint64(i) + TWO] = row[np.uint64(i)]
+            for i in range(BORDER):
+                into[i], into[width + BORDER + i] = row[0], row[width - 1]
+
+
+@lane_part
+def classify(planes, activity, classes, bins):
+    """classes = by eighths of the samples in order of activity.
 
     Activity is the sum of |second differences| along rows and columns of the first plane over 5×5 samples.
     """
     height, width = classes.shape
-    for p in range(3):
-        for y in range(height + 2 * BORDER):
-            row = views[view, p, clamped(y - BORDER, height)]
-            for x in range(width + 2 * BORDER):
-                planes[p, y, x] = row[clamped(x - BORDER, width)]
-    for y in range(height):
-        above, row, below = planes[0, y + 1], planes[0, y + 2], planes[0, y + 3]
-        for x in range(width):
-            twice = 2 * np.int32(row[x + 2])
-            across = abs(np.int32(row[x + 1]) + row[x + 3] - twice)
-            activity[0, y, x] = across + abs(np.int32(above[x + 2]) + below[x + 2] - twice)
-    for y in range(height):
-        for x in range(width):
-            total = np.int32(0)
-            for i in range(-2, 3):
-                total += activity[0, y, clamped(x + i, width)]
-            activity[1, y, x] = total
+    _measure_activity(planes, activity)
     for i in range(BINS):
         bins[i] = 0
     for y in range(height):
         for x in range(width):
-            total = np.int32(0)
-            for i in range(-2, 3):
-                total += activity[1, clamped(y + i, height), x]
-            place = min(total >> BIN_SHIFT, BINS - 1)
-            activity[0, y, x] = place
-            bins[place] += 1
+            bins[activity[0, y, x]] += 1
     below = np.int64(0)
     for i in range(BINS):  # of each bin its class
         count = np.int64(bins[i])
@@ -189,8 +194,51 @@ def prepare_view(views, view, planes, activity, classes, bins):
             classes[y, x] = bins[activity[0, y, x]]
 
 
-@lean_kernel
-def filter_view(views, view, filters, limit, planes, activity, classes, bins):
+@lane_stage
+def _measure_activity(planes, activity):
+    """activity[0, :H, :W] = bins of activity; rows of sums along rows lie in activity[1]."""
+    height, width = activity.shape[1] - 2 * BORDER, activity.shape[2] - 2 * BORDER
+    for y in range(height):
+        above, row, below, into = planes[0, y + 1], planes[0, y + 2], planes[0, y + 3], activity[0, y]
+        for i in range(width):
+            x = np.uint64(i)
+            twice = np.int32(2 * np.int32(row[x + TWO]))
+            across = np.int32(np.int32(row[x + ONE]) + np.int32(row[x + THREE])) - twice
+            down = np.int32(np.int32(above[x + TWO]) + np.int32(below[x + TWO])) - twice
+            into[x + TWO] = abs(np.int32(across)) + abs(np.int32(down))
+        for i in range(BORDER):
+            into[i], into[width + BORDER + i] = into[BORDER], into[width + BORDER - 1]
+    for y in range(height + 2 * BORDER):
+        row, into = activity[0, min(max(y - BORDER, 0), height - 1)], activity[1, y]
+        for i in range(width):
+            x = np.uint64(i)
+            into[x] = row[x] + row[x + ONE] + row[x + TWO] + row[x + THREE] + row[x + FOUR]
+    for y in range(height):
+        into, outer, above, row = activity[0, y], activity[1, y], activity[1, y + 1], activity[1, y + 2]
+        below, last = activity[1, y + 3], activity[1, y + 4]
+        for i in range(width):
+            x = np.uint64(i)
+            total = np.int32(outer[x] + above[x] + row[x] + below[x] + last[x])
+            into[x] = min(total >> np.int32(BIN_SHIFT), np.int32(BINS - 1))
+
+
+@lane_stage
+def _add_by_class(classes, taps, k, shift, row, total):
+    """Add a tap times a row of differences: comparisons are faster than a table."""
+    t0, t1 = np.int32(taps[0, k]), np.int32(taps[1 >> shift, k])
+    t2, t3 = np.int32(taps[2 >> shift, k]), np.int32(taps[3 >> shift, k])
+    t4, t5 = np.int32(taps[4 >> shift, k]), np.int32(taps[5 >> shift, k])
+    t6, t7 = np.int32(taps[6 >> shift, k]), np.int32(taps[7 >> shift, k])
+    for i in range(len(total)):
+        x = np.uint64(i)
+        own = np.int32(classes[x])
+        low = (t1 if own & 1 else t0) if own < 2 else (t3 if own & 1 else t2)
+        high = (t5 if own & 1 else t4) if own < 6 else (t7 if own & 1 else t6)
+        total[x] += np.int32((low if own < 4 else high) * row[x])
+
+
+@lane_kernel
+def filter_view(views, view, filters, limit, planes, activity, classes, bins, found):
     """Filter a decoded view.
 
     Parameters
@@ -202,33 +250,47 @@ def filter_view(views, view, filters, limit, planes, activity, classes, bins):
         Of limited differences; with 0 they are 0.
     planes : ndarray of int16, (3, H + 4, W + 4)
         Memory, as all that follows.
-    activity : ndarray of int32, (2, H, W)
+    activity : ndarray of int32, (2, H + 4, W + 4)
     classes : ndarray of uint8, (H, W)
-    bins : ndarray of int32, (BINS + TAPS,)
+    bins : ndarray of int32, (BINS,)
+    found : ndarray of int32, (TAPS + 1, W)
     """
     height, width = classes.shape
-    prepare_view(views, view, planes, activity, classes, bins)
-    found = bins[BINS:]
+    modes = filters.modes[view]
+    with_border(views, view, planes)
+    if max(modes[0], modes[1], modes[2]) > 1:
+        classify(planes, activity, classes, bins)
+    total = found[TAPS]
     for p in range(3):
-        mode = filters.modes[view, p]
+        mode = modes[p]
         if mode:
             taps = filters.taps[view, p]
-            shift = 3 if mode == 1 else 3 - mode
+            shift = np.uint8(3 if mode == 1 else 3 - mode)
             for y in range(height):
-                for x in range(width):
-                    _differences(planes, p, y + BORDER, x + BORDER, limit, found)
-                    own, total = taps[classes[y, x] >> shift], np.int32(128)
-                    for i in range(TAPS):
-                        total += np.int32(own[i]) * found[i]
-                    value = np.int32(planes[p, y + BORDER, x + BORDER]) + (total >> 8)
-                    views[view, p, y, x] = min(max(value, -LIMIT), LIMIT)
+                find_differences(planes, p, y, limit, found)
+                for i in range(width):
+                    total[np.uint64(i)] = 128
+                for k in range(TAPS):
+                    row, tap = found[k], np.int32(taps[0, k])
+                    if mode == 1:
+                        for i in range(width):
+                            x = np.uint64(i)
+                            total[x] += np.int32(tap * row[x])
+                    else:
+                        _add_by_class(classes[y], taps, k, shift, row, total)
+                row, into = planes[p, y + BORDER], views[view, p, y]
+                for i in range(width):
+                    x = np.uint64(i)
+                    value = np.int32(np.int32(row[x + TWO]) + (total[x] >> np.int32(8)))
+                    into[x] = min(max(value, np.int32(-LIMIT)), np.int32(LIMIT))
 
 
 def memory(height: int, width: int) -> tuple[Any, ...]:
     """Return memory for `filter_view`."""
     return (
         np.zeros((3, height + 2 * BORDER, width + 2 * BORDER), np.int16),
-        np.zeros((2, height, width), np.int32),
+        np.zeros((2, height + 2 * BORDER, width + 2 * BORDER), np.int32),
         np.zeros((height, width), np.uint8),
-        np.zeros(BINS + TAPS, np.int32),
+        np.zeros(BINS, np.int32),
+        np.zeros((TAPS + 1, width), np.int32),
     )

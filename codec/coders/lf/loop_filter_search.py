@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.base.jit import lean_kernel
+from ii_core.base.jit import lane_kernel, lane_part, lane_stage
 
 from . import contexts as at
 from .arithmetic import Arithmetic, bit_costs
 from .loop_filter import (
-    BINS,
-    BORDER,
     CLASSES,
     COUNTS,
     MOST_TAP,
     TAPS,
     Filters,
-    _differences,
+    classify,
+    find_differences,
     memory,
-    prepare_view,
+    with_border,
 )
 
 UNIT = 256  # of taps
 PRECISIONS = 4  # that are tried: multiples of 1, 2, 4 and 8
 HEAD, LEAST_BITS = 4.0, 1.4  # bits of a new filter beside its taps, and of a tap that is expected
+GROUP = 128  # samples of a class whose products are added at once
+exact_sums = partial(lane_stage, fastmath={"reassoc"})  # of whole numbers below 2^53: the same in any order
 
 
 class Moments(NamedTuple):
@@ -64,26 +66,50 @@ class Found(NamedTuple):
     gains: list[float]
 
 
-@lean_kernel
-def _add_moments(views, view, original, limit, planes, activity, classes, bins, products, missed, counts, row):
+@lane_kernel
+def _add_moments(views, view, original, limit, planes, activity, classes, bins, found, moments, waiting):
+    """Add the sums of a view; of products those with an earlier difference or itself."""
     height, width = classes.shape
-    prepare_view(views, view, planes, activity, classes, bins)
-    found = bins[BINS:]
+    with_border(views, view, planes)
+    classify(planes, activity, classes, bins)
+    products, missed, counts = moments
     for p in range(3):
+        counts[:] = 0
         for y in range(height):
+            find_differences(planes, p, y, limit, found)
+            errors, own, decoded = found[TAPS], original[p, y], views[view, p, y]
+            for x in range(width):
+                errors[x] = np.int32(own[x]) - np.int32(decoded[x])
             for x in range(width):
                 k = np.int64(classes[y, x])
-                _differences(planes, p, y + BORDER, x + BORDER, limit, found)
-                for i in range(TAPS):
-                    row[i] = found[i]
-                error = np.float64(original[p, y, x] - views[view, p, y, x])
-                if p == 0:
-                    counts[k] += 1
-                for i in range(TAPS):
-                    value, into = row[i], products[p, k, i]
-                    missed[p, k, i] += value * error
-                    for j in range(TAPS):
-                        into[j] += value * row[j]
+                place = np.int64(counts[k]) % GROUP
+                counts[k] += 1
+                for i in range(TAPS + 1):
+                    waiting[k, i, place] = found[i, x]
+                if place == GROUP - 1:
+                    _add_group(waiting[k], products[p, k], missed[p, k])
+        for k in range(CLASSES):
+            for i in range(TAPS + 1):
+                for rest in range(np.int64(counts[k]) % GROUP, GROUP):
+                    waiting[k, i, rest] = 0
+            _add_group(waiting[k], products[p, k], missed[p, k])
+
+
+@lane_part
+def _add_group(waiting, products, missed):
+    for i in range(TAPS):
+        one = waiting[i]
+        for j in range(i + 1):
+            products[i, j] += _product(one, waiting[j])
+        missed[i] += _product(one, waiting[TAPS])
+
+
+@exact_sums
+def _product(one, other):
+    total = np.float64(0)
+    for i in range(GROUP):
+        total += one[np.uint64(i)] * other[np.uint64(i)]
+    return total
 
 
 def search_filters(
@@ -91,7 +117,9 @@ def search_filters(
 ) -> Found:
     """Return the best new filters of a decoded view; ``weight`` is the squared error that a bit is worth."""
     moments = Moments(np.zeros((3, CLASSES, TAPS, TAPS)), np.zeros((3, CLASSES, TAPS)), np.zeros(CLASSES))
-    _add_moments(views, view, original, limit, *memory(*views.shape[2:]), *moments, np.zeros(TAPS))
+    waiting = np.zeros((CLASSES, TAPS + 1, GROUP))
+    _add_moments(views, view, original, limit, *memory(*views.shape[2:]), moments, waiting)
+    moments.products[:] += np.tril(moments.products, -1).swapaxes(2, 3)
     modes, taps, gains = [], np.zeros((3, CLASSES, TAPS), np.int64), []
     for p in range(3):
         best: Best = (0.0, 0, taps[p])
