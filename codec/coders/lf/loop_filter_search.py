@@ -88,11 +88,11 @@ def _add_moments(views, view, original, limit, planes, activity, classes, bins, 
                     waiting[k, i, place] = found[i, x]
                 if place == GROUP - 1:
                     _add_group(waiting[k], products[p, k], missed[p, k])
-        for k in range(CLASSES):
+        for one in range(CLASSES):  # the rest of its samples
             for i in range(TAPS + 1):
-                for rest in range(np.int64(counts[k]) % GROUP, GROUP):
-                    waiting[k, i, rest] = 0
-            _add_group(waiting[k], products[p, k], missed[p, k])
+                for none in range(np.int64(counts[one]) % GROUP, GROUP):
+                    waiting[one, i, none] = 0
+            _add_group(waiting[one], products[p, one], missed[p, one])
 
 
 @lane_part
