@@ -20,8 +20,8 @@ from .arithmetic import code_bit, code_number, code_raw
 from .blocks import LIMIT
 from .warp import clamped
 
-# Six even pairs, two odd ones, and six even of the first plane, limited if it is filtered itself; those from version 13
-# on. `find_differences` lists them.
+# Six even pairs, two odd ones, and six even of the first plane: if it is filtered itself, limited ones, from version
+# 13 on. `find_differences` lists them.
 TAPS, OWN = 14, 8
 GROUPS = np.array([0, 0, 1, 1, 1, 1, 2, 2, 3, 3, 3, 3, 3, 3])  # of contexts, by tap
 CLASSES = 8
