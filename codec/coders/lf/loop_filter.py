@@ -116,7 +116,7 @@ def _code_taps(coder, taps, plane, count, length):
 
 @lane_stage
 def find_differences(planes, p, y, limit, found):
-    """found[:TAPS, x] = differences of a row's samples from their neighbours; of their planes, rows have borders."""
+    """found[:TAPS, :W] = differences of a row's samples from their neighbours; planes are (3, H + 4, W + 4)."""
     plane = planes[p]
     outer, above, row, below, last = plane[y], plane[y + 1], plane[y + 2], plane[y + 3], plane[y + 4]
     _find_even(outer, above, row, below, last, found)
@@ -141,6 +141,7 @@ def find_differences(planes, p, y, limit, found):
 
 @lane_stage
 def _find_even(outer, above, row, below, last, found):
+    """found[:6] = even differences of a row's samples, from it and two rows to either side."""
     for i in range(found.shape[1]):
         x = np.uint64(i)
         twice = np.int32(2 * np.int32(row[x + TWO]))
@@ -160,7 +161,7 @@ def _limited(other, own, limit):
 
 @lane_part
 def with_border(views, view, planes):
-    """planes = a view and its border."""
+    """planes (3, H + 4, W + 4) = a view and its border, which repeats its samples."""
     height, width = views.shape[2:]
     for p in range(3):
         for y in range(height + 2 * BORDER):

@@ -97,6 +97,7 @@ def _add_moments(views, view, original, limit, planes, activity, classes, bins, 
 
 @lane_part
 def _add_group(waiting, products, missed):
+    """Add the sums of a class' waiting samples, (TAPS + 1, GROUP): differences, and what the decoded samples miss."""
     for i in range(TAPS):
         one = waiting[i]
         for j in range(i + 1):
