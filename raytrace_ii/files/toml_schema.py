@@ -10,10 +10,17 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, ValidationError, model_validator
 
 from ..scene.textures import Colour, srgb_colour
-from ..shapes.any_shape import AnyShape
+from ..shapes.heightfield import Heightfield
+from ..shapes.implicit import Implicit
 from ..shapes.implicit_parts import PARTS
-from ..shapes.primitives import Point3
+from ..shapes.primitives import Box, BoxGrid, Cylinder, Plane, Point3, Revolve, Sphere
+from ..shapes.strands import Strands
 from .validation_messages import line, words
+
+AnyShape = Annotated[
+    Sphere | Box | Plane | Cylinder | Revolve | BoxGrid | Implicit | Heightfield | Strands,
+    Field(discriminator="shape"),
+]
 
 
 def _share(value: Any) -> Point3:

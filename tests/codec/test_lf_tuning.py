@@ -116,7 +116,10 @@ def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, 
         dependent=version > stream.TUNED,
         directed=version > stream.DEPENDENT,
         parted=version > stream.DIRECTED,
-        rig=rng.bytes(int(rng.integers(1, 300))) if version == stream.RIGGED else b"",
+        refined=version >= stream.REFINED,
+        limited=version >= stream.LIMITED,
+        guided=version >= stream.GUIDED,
+        rig=rng.bytes(int(rng.integers(1, 300))) if version >= stream.RIGGED else b"",
         steps=tuple(rng.integers(1, (1 << 18) + 1, log_stride + 2).tolist()),
     )
     levels = [rng.bytes(int(rng.integers(0, 300))) for _ in header.steps]

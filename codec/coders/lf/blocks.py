@@ -15,20 +15,23 @@ from . import contexts as at
 from . import motion
 from .arithmetic import DECODING, REFINED, Arithmetic, bit_cost, code_bit, code_of_four
 from .coefficients import code_coefficients
-from .cross import code_cross, keep_first, rebuild
-from .intra import SMOOTH, fill_border, predict_intra, turn_class
+from .cross import code_cross, code_following, keep_first, predict_following, rebuild
+from .intra import SMOOTH, coarse, fill_border, predict_intra, turn_class
 from .kinds import code_kind
 from .modes import mode_class
 from .samples import LARGEST_SKIPPED, code_samples
+from .signs import code_signs
 from .state import (
     CODED,
     CROSS_1,
     DIRECTION,
     DONE,
     EXPLICIT,
+    FOLLOWS,
     INDEX,
     INTRA,
     KIND,
+    LIMIT,
     LOG,
     MASK,
     MIXED,
@@ -48,8 +51,7 @@ from .transform import SINE_ACROSS, SINE_DOWN, sides, size_of
 from .warp import led, moved_block
 
 LOG_LARGEST, LOG_LEAST = 5, 2
-MOST_HALVINGS = 2  # of a square
-LIMIT = 8191  # of a decoded sample's magnitude, in eighths of an 8-bit code
+MOST_HALVINGS = 2, 3  # of a square; from version 14 on
 MOST_INDEX = 1 << 14
 
 
@@ -100,7 +102,8 @@ def _code_residual(coder, job, by, bx, shape, kind, direction, coded):
         first = np.int64(blocks[DIRECTION, by, bx - 1]) if bx > 0 else np.int64(SMOOTH)
         second = np.int64(blocks[DIRECTION, by - 1, bx]) if by > 0 else np.int64(SMOOTH)
         corner, above, left = around_block(blocks, DIRECTION, by, bx, shape, np.int64(SMOOTH))
-        mode = 6 * mode_class(direction) + (1 if first == direction else 0) + (1 if second == direction else 0)
+        mode = 6 * mode_class(coarse(direction))
+        mode += (1 if first == direction else 0) + (1 if second == direction else 0)
         mode += (1 if corner == direction else 0) + (1 if above == direction else 0) + (1 if left == direction else 0)
     corner, above, left = around_block(blocks, CODED, by, bx, shape, np.int64(0))
     near = neighbours(blocks, np.int64(CODED), np.int64(1), by, bx) + corner + above + left
@@ -217,12 +220,12 @@ def _note_levels(job, work, plane, y0, x0, shape):
 
 
 @part_kernel
-def note_skipped(blocks, by, bx, shape, skipped):
-    """Note whether a block has no transform."""
+def note_skipped(blocks, by, bx, shape, skipped, follows):
+    """Note whether a block has no transform, and whether its colours follow the first plane."""
     h, w = sides(shape)
     for y in range(by, by + (h >> 2)):
         for x in range(bx, bx + (w >> 2)):
-            blocks[SKIPPED, y, x] = skipped
+            blocks[SKIPPED, y, x], blocks[FOLLOWS, y, x] = skipped, follows
 
 
 @part_kernel
@@ -270,13 +273,17 @@ def code_block(coder, job, work, y0, x0, shape, leaf):
     if decoding:
         _predict(job, work, y0, x0, shape, kind, index, mask, direction)
     coded = _code_residual(coder, job, by, bx, shape, kind, direction, np.int64(blocks[CODED, by, bx]))
-    first = skipped = 0
+    first = skipped = follows = 0
+    if coded and job.guided and job.crossed and kind == INTRA:
+        follows = code_following(coder, job, by, bx, shape, direction, np.int64(blocks[FOLLOWS, by, bx]))
     if coded and job.skipping and shape[0] + shape[1] <= LARGEST_SKIPPED:
         skipped = code_bit(coder, skipped_context(job, by, bx, shape), np.int64(blocks[SKIPPED, by, bx]) & 1)
     if coded and job.directed and kind == INTRA and not skipped:
         skipped = 2 * _code_transform(coder, shape, np.int64(blocks[SKIPPED, by, bx]) >> 1)
     for p in range(3):
         some = cross = 0
+        if decoding and follows and p:
+            predict_following(job, job.views[job.at, 0, y0:, x0:], work, p, y0, x0, shape)
         if coded:
             some, cross = _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped, direction)
             if p == 0:
@@ -291,7 +298,17 @@ def code_block(coder, job, work, y0, x0, shape, leaf):
             store(job, work, p, y0, x0, shape, some or cross)
     if decoding:
         mark_block(job, by, bx, shape, leaf, kind, index, mask, direction, coded)
-        note_skipped(blocks, by, bx, shape, skipped)
+        note_skipped(blocks, by, bx, shape, skipped, follows)
+    else:
+        _note_done(blocks, by, bx, shape)
+
+
+@stage_kernel
+def _note_done(blocks, by, bx, shape):
+    h, w = sides(shape)
+    for y in range(by, by + (h >> 2)):
+        for x in range(bx, bx + (w >> 2)):
+            blocks[DONE, y, x] = 1
 
 
 @stage_kernel
@@ -327,7 +344,12 @@ def _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped, direct
     elif some:
         turn = turn_class(direction) if kind == INTRA else 0
         intra, ways = 1 if kind == INTRA else 0, (job.finer, job.dependent)
-        code_coefficients(coder, work.levels, p, shape, intra, ways, job.levels, (y0, x0), turn)
+        guided = job.guided and intra and p == 0
+        code_coefficients(coder, work.levels, p, shape, intra, ways, job.levels, (y0, x0), turn, 0 if guided else 1)
+        if guided:
+            if not decoding:
+                predict_direction(job, work, 0, y0, x0, shape, direction)
+            code_signs(coder, job, work, work.levels, y0, x0, shape, skipped >> 1)
         if decoding and coder.state[REFINED]:
             _note_levels(job, work, p, y0, x0, shape)
     return some, cross
@@ -439,6 +461,7 @@ def code_view(coder: Arithmetic, job: Job, work: Work) -> None:
     """Write all blocks of a view, which are marked, or read and decode them."""
     height, width = job.levels.shape[1:]
     size = 1 << LOG_LARGEST
+    job.blocks[DONE] = 0  # an encoder predicts once more, as the decoder does
     for y0 in range(0, height, size):
         for x0 in range(0, width, size):
             code_tree(coder, job, work, y0, x0, LOG_LARGEST)

@@ -51,7 +51,7 @@ GOOD_SAMPLES = 128 * 64
 SURELY = 5.0, 5.0, 2.0  # times GOOD: intra modes are not tried below it
 # intra modes of the first view that are compared by coefficients and coded on trial, by effort
 FIRST_ESTIMATES, FIRST_TRIES = (0, 8, 20), (1, 3, 8)
-HALVINGS = 0, 1, 2  # of squares of blocks
+HALVINGS = 0, 1, 2  # of squares of blocks; one more of the first view by `best`
 BLEND_ROWS = 4, 4, 1  # the kind of blending is chosen by every so many-th row
 WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it. The first view is finer than
@@ -290,6 +290,7 @@ class Source:
             parted=not exact,
             refined=not exact,
             limited=not exact,
+            guided=not exact,
             rig=b"" if entries is None else rig.pack(entries, self.grid[0] // 2 * self.grid[1] + self.grid[1] // 2),
             steps=(),
         )
@@ -483,7 +484,7 @@ class Source:
             least=3 if effort == 0 else 2,
             intra_tries=FIRST_TRIES[self.effort] if first else (1, 1, 3)[effort],
             intra_estimates=FIRST_ESTIMATES[self.effort] if first else 0,
-            halvings=HALVINGS[effort],
+            halvings=HALVINGS[effort] + (first and self.effort == 2),
             good=np.float32(GOOD[effort] * share),
             surely=np.float32(SURELY[effort]),
             planes=1 if effort == 0 else 3,

@@ -141,12 +141,12 @@ def _beside(planes, plane, corner, y, x, h, w, near, dependent):
 
 
 @part_kernel
-def code_coefficients(coder, levels, plane, shape, intra, ways, planes, corner, turn):
+def code_coefficients(coder, levels, plane, shape, intra, ways, planes, corner, turn, signed):
     """Write or read levels[:h, :w], of which one at least is not zero; a reader finds only zeros there before.
 
     ``ways`` say whether contexts are those of version 7, and whether the quantiser is dependent. In a refined coder
     ``planes`` are the levels of earlier planes, the block's from a corner on, and ``turn`` is `intra.turn_class` of
-    its mode, 0 of other blocks.
+    its mode, 0 of other blocks. Signs are left out if levels are not ``signed``: a reader finds magnitudes.
     """
     (h, w), log, refined = sides(shape), size_of(shape), coder.state[REFINED]
     finer, dependent = ways
@@ -197,7 +197,10 @@ def code_coefficients(coder, levels, plane, shape, intra, ways, planes, corner, 
         if dependent:
             odd, state = state >> 1, np.int64(NEXT[state, found & 1])
             found = 2 * found - odd
-        levels[y, x] = -found if code_raw(coder, 1 if value < 0 else 0) else found
+        if signed:
+            levels[y, x] = -found if code_raw(coder, 1 if value < 0 else 0) else found
+        elif value == 0:  # a reader's
+            levels[y, x] = found
 
 
 @stage_kernel

@@ -149,7 +149,17 @@ ELEMENT_WEIGHTS = RESIDUAL_FORM + 32  # element × (three weights; the bits befo
 COEFFICIENT_WEIGHTS = ELEMENT_WEIGHTS + 2 * len(ELEMENTS)  # those of WEIGHTS 15 × (three weights; the fourth)
 # First and second likely mode, flat or smooth, side, straight, residual 6 × (three weights; the fourth).
 MODE_WEIGHTS = COEFFICIENT_WEIGHTS + 30
-COUNT = MODE_WEIGHTS + 12
+# Of version 14: a direction beside one of the 34, and which way.
+BESIDE_PLACE = MODE_WEIGHTS + 12  # block size 4 × direction 34
+BESIDE_NEAR = BESIDE_PLACE + 136  # relation of the first likely mode 6 × of the second 6
+WAY_PLACE = BESIDE_NEAR + 36  # as BESIDE_PLACE
+WAY_NEAR = WAY_PLACE + 136  # as BESIDE_NEAR
+FOLLOWS_NEAR = WAY_NEAR + 36  # block size 4 × such neighbours 3
+FOLLOWS_MODE = FOLLOWS_NEAR + 12  # class of the mode 5 × such neighbours 3
+SIGN_SIZE = FOLLOWS_MODE + 15  # part of the coefficient that the border wants 8 × magnitude 6
+SIGN_PLACE = SIGN_SIZE + 48  # part 8 × place in the order 8
+GUIDED_WEIGHTS = SIGN_PLACE + 64  # beside, way, follows, sign 4
+COUNT = GUIDED_WEIGHTS + 4
 STARTING_WEIGHTS = (45875, 13107, 13107), (22938, 22938, 16384, 9830)
 # Row of a context's element in `ELEMENTS`, and its place in `PLAIN`.
 ELEMENT_OF = np.searchsorted(ELEMENTS, np.arange(ENDED), side="right") - 1
@@ -291,6 +301,14 @@ REFINED_STARTS = (
     "RUPVYXYWVZVWYUUBI*SWcKQVQWZMQTPZd01*IUZ126HOQ13D7PSPVaJTTSXimhbQ64******loldZP3G****mrmnhfcQ5Q**VXVM0*******ae"
     "dYVK1*****clkmfbZKC***WXVK0*******YfcZWK1*****bjkeccZGB***"
 )
+# Of version 14, from BESIDE_PLACE on: the mean over eight photographs, at five quantisers each.
+GUIDED_STARTS = (
+    "MQRQSSTSOOSPSQQOJ*QRSTRSSOPRQTQSMLQOUUUSUTQSSRUORLL*PUVWSUUPPSSWSUJLQSSSSTTSRSQPUQSOM*SRSUTSUOPPRXRTPO********"
+    "PQ***************P********MPqKORPQiQVSqh*hfjQTe*LSKUe**SRUiRQT*ZXZVUUXTSTVWTWS**YTYUUTWXSWTUS*W**SVVVVVXUQUVUT"
+    "*a**TXXVTUZYQVVUS*Y***W**TUXUNW*V***********dZT*SX**************************************VSSgKXTTR**VXT*hLXi*e*"
+    "**K*M***XUX**Y***************************VVVVVVVVVUUUVVVVUUVUUUTUUUTTSSUTRRQQTRRQPOTSRRQRVVWVVVUVVUUUVVUVUVVUV"
+    "VVVUUUUUVVUSSTTTUTURRRSSSSTQOQRRRSTRQRRSSRT"
+)
 REFINED_TRUSTED = 7
 
 
@@ -318,14 +336,16 @@ def starting_contexts(refined: bool = False) -> NDArray[np.int32]:
     ):
         contexts[to : to + end - of] = contexts[of:end]
     if refined:
-        known = [i for i, digit in enumerate(REFINED_STARTS) if digit != "*"]
-        starts = np.array([PROBABILITIES[DIGITS.index(REFINED_STARTS[i])] for i in known])
+        digits = REFINED_STARTS.ljust(BESIDE_PLACE, "*") + GUIDED_STARTS
+        known = [i for i, digit in enumerate(digits) if digit != "*"]
+        starts = np.array([PROBABILITIES[DIGITS.index(digits[i])] for i in known])
         contexts[known] = np.stack([starts, starts, np.full_like(starts, REFINED_TRUSTED)], axis=1)
     three, four = STARTING_WEIGHTS
     contexts[ELEMENT_WEIGHTS:COEFFICIENT_WEIGHTS:2] = three
     contexts[ELEMENT_WEIGHTS + 1 : COEFFICIENT_WEIGHTS : 2] = 0
-    contexts[COEFFICIENT_WEIGHTS:COUNT:2] = four[:3]
-    contexts[COEFFICIENT_WEIGHTS + 1 : COUNT : 2] = four[3], 0, 0
+    contexts[COEFFICIENT_WEIGHTS:BESIDE_PLACE:2] = four[:3]
+    contexts[COEFFICIENT_WEIGHTS + 1 : BESIDE_PLACE : 2] = four[3], 0, 0
+    contexts[GUIDED_WEIGHTS:] = 1 << 15
     return contexts
 
 

@@ -1,21 +1,28 @@
-"""Prediction of the residual's second and third plane from its first: the colours of a block often lie on a line.
+"""Prediction of the second and third plane from the first: the colours of a block often lie on a line.
 
-The factor is in quarters or eighths, chosen for each block and plane. It multiplies the first plane's coefficients as
-decoded.
+Of a residual, by a factor in quarters or eighths, chosen for each block and plane. It multiplies the first plane's
+coefficients as decoded. Of an intra block, if it *follows* its first plane: the line is that of the decoded samples
+above and to the left.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ii_core.base.jit import part_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from . import contexts as at
-from .arithmetic import bit_cost, code_bit
+from .arithmetic import bit_cost, code_bit, code_mixed
 from .coefficients import dequantise
-from .transform import inverse, sides
+from .intra import coarse
+from .modes import mode_class
+from .state import FOLLOWS, LIMIT, neighbours
+from .transform import inverse, sides, size_of
 
 MOST_CROSS = 4  # units
+STEEPEST = 4 << 10  # slope of the line that an intra block follows, in 2^-10
 
 
 @part_kernel
@@ -102,3 +109,43 @@ def rebuild(work, levels, shape, step, some, cross, shift, skipped, dependent):
     else:
         inverse(work.coefficients, shape, rows, cols, work.half, work.block, skipped >> 1)
     return rows, cols
+
+
+@stage_kernel
+def _following_contexts(job, by, bx, shape, mode):
+    like = neighbours(job.blocks, np.int64(FOLLOWS), np.int64(1), by, bx)
+    return at.FOLLOWS_NEAR + (size_of(shape) - 2) * 3 + like, at.FOLLOWS_MODE + mode_class(coarse(mode)) * 3 + like
+
+
+@part_kernel
+def code_following(coder, job, by, bx, shape, mode, follows):
+    """Write or read whether the colours of an intra block follow its first plane."""
+    one, other = _following_contexts(job, by, bx, shape, mode)
+    return code_mixed(coder, one, other, np.int64(at.GUIDED_WEIGHTS + 2), follows)
+
+
+@part_kernel
+def following_cost(costs, job, by, bx, shape, follows):
+    """Bits that `code_following` would take."""
+    return bit_cost(costs, _following_contexts(job, by, bx, shape, np.int64(0))[0], follows)
+
+
+@part_kernel
+def predict_following(job, first, work, plane, y0, x0, shape):
+    """work.predicted[plane] = the line that fits the decoded samples around the block, of ``first``, those in it."""
+    (h, w), firsts, own = sides(shape), job.views[job.at, 0], job.views[job.at, plane]
+    above, left = w if y0 else 0, h if x0 else 0
+    count = np.int64(above + left)
+    xs = ys = xx = xy = np.int64(0)
+    for i in range(above + left):
+        row, col = (y0 - 1, x0 + i) if i < above else (y0 + i - above, x0 - 1)
+        one, other = np.int64(firsts[row, col]), np.int64(own[row, col])
+        xs, ys, xx, xy = xs + one, ys + other, xx + one * one, xy + one * other
+    spread = count * xx - xs * xs
+    slope: Any = ((count * xy - xs * ys) << 10) // spread if spread > 0 else 0
+    slope = min(max(slope, -STEEPEST), STEEPEST)
+    offset: Any = ((ys << 10) - slope * xs) // count + 512 if count else 0
+    predicted = work.predicted[plane]
+    for y in range(h):
+        for x in range(w):
+            predicted[y, x] = min(max((slope * np.int64(first[y, x]) + offset) >> 10, -LIMIT), LIMIT)

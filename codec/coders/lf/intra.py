@@ -1,4 +1,4 @@
-"""Intra prediction of a block from decoded samples above and to the left: flat, smooth, or 34 directions."""
+"""Intra prediction of a block from decoded samples above and to the left: flat, smooth, or a direction."""
 
 from __future__ import annotations
 
@@ -11,8 +11,18 @@ from .transform import LARGEST, sides, size_of
 FLAT, SMOOTH, DIRECTIONS = 0, 1, 34
 MODES = 2 + DIRECTIONS
 FROM_LEFT = 2 + DIRECTIONS // 2  # the first direction from the left
-# Eighths of a sample by the slope's magnitude and the place.
-BEYOND = np.array([[64 * (i + 1) // max(slope, 1) for i in range(LARGEST)] for slope in range(9)])
+# From version 14 on two more beside each direction: MODES + 2 · (its place among them), and one more.
+ALL_MODES = MODES + 2 * DIRECTIONS
+BESIDE, STEEPEST = 3, 64  # how far from it, in 2^-6 of a sample a row, and the most that a direction turns
+# How far up or down the other side a direction meets it, in 2^-6 of a sample, by the slope's magnitude and the place;
+# of the 34 directions in eighths, rounded down.
+_PLACES = np.arange(1, LARGEST + 1)
+BEYOND = np.stack(
+    [
+        4096 * _PLACES // max(slope, 1) if slope % 8 else 512 * _PLACES // max(slope, 8) * 8
+        for slope in range(STEEPEST + 1)
+    ]
+)
 # From version 9 on, by block size (4, 8, 16, 32): least slopes of directions that go on from a smoothed border. The
 # border draws flat, smooth and straight blocks towards it: its weight halves after 2^(fade - 1) samples.
 LEAST_SLOPES = 99, 7, 2, 1
@@ -22,9 +32,24 @@ TURNS = np.array([1] * 2 + [2] * 5 + [3] * 7 + [4] * 5 + [2] * 5 + [5] * 7 + [4]
 
 
 @stage_kernel
+def coarse(mode):
+    """The mode itself, or the one of the 34 directions that it is beside."""
+    return mode if mode < MODES else 2 + ((mode - MODES) >> 1)
+
+
+@stage_kernel
+def slope_of(mode):
+    """How far a direction turns from straight in a row, in 2^-6 of a sample."""
+    slope = 8 * ((coarse(mode) - 2) % (DIRECTIONS // 2) - 8)
+    if mode >= MODES:
+        slope += BESIDE if (mode - MODES) & 1 else -BESIDE
+    return min(max(slope, -STEEPEST), STEEPEST)
+
+
+@stage_kernel
 def turn_class(mode):
     """Class of an intra mode: 1 without a direction, 3 near straight down, 5 near straight across, 2, 4 else."""
-    return np.int64(TURNS[mode])
+    return np.int64(TURNS[coarse(mode)])
 
 
 @part_kernel
@@ -70,26 +95,26 @@ def fill_border(views, at, plane, blocks, done, y0, x0, shape, border, smoothed)
 @part_kernel
 def predict_along(border, mode, shape, square, smoothed):
     """square[:h, :w] = the prediction by a direction; if that comes from the left, lying: rows are columns."""
-    from_left = mode >= FROM_LEFT
+    from_left = coarse(mode) >= FROM_LEFT
     (h, w), log, fade = sides(shape), size_of(shape), (shape[0] + shape[1] - 2) >> 2
-    slope = (mode - 2) % (DIRECTIONS // 2) - 8
-    first = 2 if smoothed and abs(slope) >= LEAST_SLOPES[log - 2] else 0
+    slope = slope_of(mode)
+    first = 2 if smoothed and abs(slope) >= 8 * LEAST_SLOPES[log - 2] else 0
     side, other = border[first + (1 if from_left else 0)], border[first + (0 if from_left else 1)]
     reach, length = (w, h) if from_left else (h, w)
     for along in range(reach):  # the distance from the border
         row, shift = square[along], (along + 1) * slope
         across = 0
-        while across < length and 8 * (across + 1) + shift < 0:  # beyond the corner
-            at = max(0, 8 * (along + 1) - BEYOND[-slope, across])
-            i, eighths = at >> 3, at & 7
-            row[across] = (other[i] * (8 - eighths) + other[i + 1] * eighths + 4) >> 3
+        while across < length and 64 * (across + 1) + shift < 0:  # beyond the corner
+            at = max(0, 64 * (along + 1) - BEYOND[-slope, across])
+            i, part = at >> 6, at & 63
+            row[across] = (other[i] * (64 - part) + other[i + 1] * part + 32) >> 6
             across += 1
-        start, part = 1 + (shift >> 3), np.int32(shift & 7)
-        rest = np.int32(8 - part)
+        start, part = 1 + (shift >> 6), np.int32(shift & 63)
+        rest = np.int32(64 - part)
         for i in range(across, length):
             one, two = side[np.uint64(start + i)], side[np.uint64(start + i + 1)]
             both = np.int32(np.int32(one * rest) + np.int32(two * part))
-            row[np.uint64(i)] = np.int32(both + np.int32(4)) >> np.int32(3)
+            row[np.uint64(i)] = np.int32(both + np.int32(32)) >> np.int32(6)
     if smoothed and slope == 0:
         _draw_straight(other, square, reach, length, fade)
 
@@ -122,7 +147,7 @@ def predict_intra(border, mode, shape, out, plane, smoothed):
                 row[x] = np.int32(both + np.int32(1 << longer)) >> halvings
     else:
         predict_along(border, mode, shape, square, smoothed)
-        if mode >= FROM_LEFT:
+        if coarse(mode) >= FROM_LEFT:
             _transpose(square, max(h, w))
     if smoothed and mode <= SMOOTH:
         _draw_to_border(border, square, h, w, fade)

@@ -6,9 +6,10 @@ import numpy as np
 
 from ii_core.base.jit import part_kernel, stage_kernel
 
-from .intra import DIRECTIONS, FROM_LEFT, MODES, fill_border, predict_along, predict_intra
+from .intra import ALL_MODES, DIRECTIONS, FROM_LEFT, MODES, coarse, fill_border, predict_along, predict_intra
 from .kinds import kind_cost
 from .matching import HUGE
+from .modes import likely_directions
 from .state import DONE, INTRA
 from .transform import sides
 
@@ -34,18 +35,18 @@ def _add_magnitudes(search, work, y0, x0, shape, plane, modes, smoothed, errors)
     """
     (h, w), (first, last, step) = sides(shape), modes
     own, lying, predicted = search.original[plane], work.block, work.predicted[plane]
-    if last > FROM_LEFT:
+    if last > MODES or last > FROM_LEFT:
         for y in range(h):
             for x in range(w):
                 lying[x, y] = own[np.uint64(y0 + y), np.uint64(x0 + x)]
     for mode in range(first, last, step):
-        if mode < 0 or mode >= MODES:
+        if mode < 0 or mode >= ALL_MODES:
             continue
         if mode < FIRST_DIRECTION:
             predict_intra(work.border, mode, shape, work.predicted, plane, smoothed)
         else:
             predict_along(work.border, mode, shape, predicted, smoothed)
-        if mode < FROM_LEFT:
+        if coarse(mode) < FROM_LEFT:
             total = _magnitudes(own, y0, x0, predicted, h, w)
         else:
             total = _magnitudes(lying, 0, 0, predicted, w, h)
@@ -57,7 +58,7 @@ def rank_directions(costs, job, search, work, y0, x0, shape, errors):
     """errors[:MODES] = sums of magnitudes and weighted bits; a hurried search leaves out unlikely directions."""
     by, bx = y0 >> 2, x0 >> 2
     every = 4 if search.hurried and job.references.shape[0] else 1
-    for mode in range(MODES):
+    for mode in range(ALL_MODES):
         errors[mode] = HUGE
     _add_planes(job, search, work, y0, x0, shape, (0, FIRST_DIRECTION, 1), errors)
     _add_planes(job, search, work, y0, x0, shape, (FIRST_DIRECTION, MODES, every), errors)
@@ -68,8 +69,12 @@ def rank_directions(costs, job, search, work, y0, x0, shape, errors):
             for mode in (best - every, best + every):
                 if FIRST_DIRECTION <= mode < MODES:
                     _add_planes(job, search, work, y0, x0, shape, (mode, mode + 1, 1), errors)
+    if job.guided:
+        for mode in likely_directions(job.blocks, by, bx):
+            if mode >= MODES:
+                _add_planes(job, search, work, y0, x0, shape, (mode, mode + 1, 1), errors)
     weight = np.float32(np.sqrt(search.weight))
-    for mode in range(MODES):
+    for mode in range(ALL_MODES if job.guided else MODES):
         if errors[mode] < HUGE:
             side = kind_cost(costs, job, by, bx, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode)
             errors[mode] += weight * side
@@ -90,7 +95,7 @@ def _add_planes(job, search, work, y0, x0, shape, modes, errors):
 def least_error(errors):
     """The mode of the least error."""
     best = 0
-    for mode in range(MODES):
+    for mode in range(ALL_MODES):
         if errors[mode] < errors[best]:
             best = mode
     return best

@@ -17,7 +17,7 @@ from ii_core.base.jit import lane_kernel, lane_part, lane_stage, lean_kernel, pa
 
 from . import contexts as at
 from .arithmetic import code_bit, code_number, code_raw
-from .blocks import LIMIT
+from .state import LIMIT
 from .warp import clamped
 
 # Six even pairs, two odd ones, and six even of the first plane: if it is filtered itself, limited ones, from version

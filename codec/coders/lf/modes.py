@@ -7,8 +7,8 @@ import numpy as np
 from ii_core.base.jit import part_kernel, stage_kernel
 
 from . import contexts as at
-from .arithmetic import REFINED, bit_cost, code_bit, code_of_four, code_raw
-from .intra import MODES, SMOOTH
+from .arithmetic import REFINED, bit_cost, code_bit, code_mixed, code_of_four, code_raw
+from .intra import MODES, SMOOTH, coarse
 from .state import DIRECTION, INTRA, KIND, around_block, neighbours
 from .transform import size_of
 
@@ -68,11 +68,18 @@ def _code_mode_around(coder, job, by, bx, shape, mode):
     like = (one - at.LIKELY) & 3
     form = 0 if shape[0] == shape[1] else (1 if shape[0] < shape[1] else 2)
     around = around_block(blocks, DIRECTION, by, bx, shape, np.int64(SMOOTH))
-    _, above, left = around
     if _code_likely(coder, first, 0, one, mode, around, like, form):
         return first
     if _code_likely(coder, second, 1, two, mode, around, like, form):
         return second
+    return _code_other(coder, job, shape, mode, (first, second), around, (undirected, smooth), like, form)
+
+
+@part_kernel
+def _code_other(coder, job, shape, mode, likely, around, undirected, like, form):
+    """Write or read a mode that is none of the likely ones, whose contexts are by the coarse modes around."""
+    first, second, above, left = coarse(likely[0]), coarse(likely[1]), coarse(around[1]), coarse(around[2])
+    exact, mode, (undirected, smooth) = mode, coarse(mode), undirected
     one_side, two_side, above_side, left_side = _side_of(first), _side_of(second), _side_of(above), _side_of(left)
     both = one_side * 3 + two_side
     directed = (1 if one_side else 0) + (1 if two_side else 0) + (1 if above_side else 0) + (1 if left_side else 0)
@@ -95,8 +102,47 @@ def _code_mode_around(coder, job, by, bx, shape, mode):
     formed, sided = at.STRAIGHT_FORM + side * 3 + form, at.STRAIGHT_SIDES + side * 9 + both
     bit, weights = 1 if mode == straight else 0, at.MODE_WEIGHTS + 8
     if code_of_four(coder, at.STRAIGHT + side, at.STRAIGHT_SAME + side * 5 + same, formed, sided, weights, bit):
-        return straight
-    return 2 + _code_slope(coder, value, side)
+        mode = straight
+    else:
+        mode = 2 + _code_slope(coder, value, side)
+    return _code_beside(coder, shape, likely, mode, exact) if job.guided else mode
+
+
+@stage_kernel
+def _relation(likely, mode):
+    """Of a likely mode and a coarse one: 0 no direction from its side, 1 before it, 5 after, 2 it, 3, 4 beside it."""
+    near = coarse(likely)
+    if _side_of(near) != _side_of(mode):
+        return 0
+    if near != mode:
+        return 1 if near < mode else 5
+    return 2 if likely < MODES else 3 + ((likely - MODES) & 1)
+
+
+@stage_kernel
+def _beside_contexts(shape, likely, mode):
+    """Of whether a direction is beside that of the mode, and of which way: two each."""
+    near = _relation(likely[0], mode) * 6 + _relation(likely[1], mode)
+    place = (size_of(shape) - 2) * 34 + mode - 2
+    return at.BESIDE_PLACE + place, at.BESIDE_NEAR + near, at.WAY_PLACE + place, at.WAY_NEAR + near
+
+
+@part_kernel
+def _code_beside(coder, shape, likely, mode, exact):
+    """Write or read which direction it is of the three by a coarse mode."""
+    one, other, way, near = _beside_contexts(shape, likely, mode)
+    if not code_mixed(coder, one, other, np.int64(at.GUIDED_WEIGHTS), 1 if exact >= MODES else 0):
+        return mode
+    up = code_mixed(coder, way, near, np.int64(at.GUIDED_WEIGHTS + 1), (exact - MODES) & 1)
+    return MODES + 2 * (mode - 2) + up
+
+
+@part_kernel
+def _beside_cost(costs, shape, likely, exact):
+    """Bits that `_code_beside` would take."""
+    _, one, _, near = _beside_contexts(shape, likely, coarse(exact))
+    bits = bit_cost(costs, one, 1 if exact >= MODES else 0)
+    return bits + bit_cost(costs, near, (exact - MODES) & 1) if exact >= MODES else bits
 
 
 @stage_kernel
@@ -118,8 +164,8 @@ def _code_likely(coder, likely, which, one, where, around, like, form):
     """Write or read whether a mode is the first likely one, or the second; ``where`` holds the mode."""
     corner, above, left = around
     agree = (1 if corner == likely else 0) + (1 if above == likely else 0) + (1 if left == likely else 0)
-    near = at.LIKELY_NEAR + (which * 5 + mode_class(likely)) * 4 + agree
-    alike = at.LIKELY_MODE + (which * MODES + likely) * 2 + (1 if left == likely else 0)
+    near = at.LIKELY_NEAR + (which * 5 + mode_class(coarse(likely))) * 4 + agree
+    alike = at.LIKELY_MODE + (which * MODES + coarse(likely)) * 2 + (1 if left == likely else 0)
     formed = at.LIKELY_FORM + (which * 3 + form) * 4 + like
     return code_of_four(coder, one, near, alike, formed, at.MODE_WEIGHTS + 2 * which, 1 if where == likely else 0)
 
@@ -162,7 +208,8 @@ def mode_cost(costs, job, by, bx, shape, mode):
     bits += bit_cost(costs, undirected, 1 if mode <= SMOOTH else 0)
     if mode <= SMOOTH:
         return bits + (bit_cost(costs, smooth, mode) if smooth >= 0 else np.float32(1))
-    return bits + (_slope_cost(costs, mode - 2) if job.directed else np.float32(5.1))
+    bits += _slope_cost(costs, coarse(mode) - 2) if job.directed else np.float32(5.1)
+    return bits + _beside_cost(costs, shape, (first, second), mode) if job.guided else bits
 
 
 @part_kernel

@@ -10,12 +10,20 @@ from ii_core.base.jit import part_kernel, stage_kernel
 
 from . import motion
 from .arithmetic import bit_cost
-from .blocks import LIMIT, coded_context, residual_context, skipped_context, transform_cost
+from .blocks import coded_context, residual_context, skipped_context, transform_cost
 from .coefficients import Trellis, new_trellis, quantise, quantise_dependent
-from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
-from .intra import MODES
+from .cross import (
+    best_cross,
+    cross_cost,
+    following_cost,
+    keep_first,
+    predict_following,
+    rebuild,
+    subtract_cross,
+)
+from .intra import ALL_MODES
 from .samples import LARGEST_SKIPPED, quantise_samples
-from .state import FIELDS, INTRA
+from .state import FIELDS, INTRA, LIMIT
 from .transform import LARGEST, forward, sides, size_of
 
 BEST = 2
@@ -41,12 +49,12 @@ class Trial(NamedTuple):
     levels: Any
     trial_decoded: Any  # (3, 32, 32) of the way tried
     trial_levels: Any
-    cross: Any  # (3, 2) factors of `cross`
+    cross: Any  # (3, 3) factors of `cross`, and whether colours follow the first plane
     trial_cross: Any
     skipped: Any  # (3,) whether there is no transform
     trial_skipped: Any  # (1,)
-    errors: Any  # (MODES,) of intra prediction
-    modes: Any  # (MODES,) of the least errors
+    errors: Any  # (ALL_MODES,) of intra prediction
+    modes: Any  # (ALL_MODES,) of the least errors
     trellis: Trellis
     kept: Kept
 
@@ -58,12 +66,12 @@ def new_trial() -> Trial:
         levels=np.zeros((3, 3, LARGEST, LARGEST), np.int16),
         trial_decoded=np.zeros((3, LARGEST, LARGEST), np.int16),
         trial_levels=np.zeros((3, LARGEST, LARGEST), np.int16),
-        cross=np.zeros((3, 2), np.int64),
-        trial_cross=np.zeros(2, np.int64),
+        cross=np.zeros((3, 3), np.int64),
+        trial_cross=np.zeros(3, np.int64),
         skipped=np.zeros(3, np.int64),
         trial_skipped=np.zeros(1, np.int64),
-        errors=np.zeros(MODES, np.float32),
-        modes=np.zeros(MODES, np.int64),
+        errors=np.zeros(ALL_MODES, np.float32),
+        modes=np.zeros(ALL_MODES, np.int64),
         trellis=new_trellis(),
         kept=Kept(
             decoded=np.zeros((11, 3, LARGEST, LARGEST), np.int16),
@@ -132,7 +140,7 @@ def try_residual(costs, job, search, work, trial, y0, x0, shape, kind, so_far):
     ``so_far`` is the least cost of the block: far above it, skipping the transform is not tried. The way is left when
     its first planes cost more than that, and those of a block without a residual, too.
     """
-    trial.trial_skipped[0] = 0
+    trial.trial_skipped[0] = trial.trial_cross[2] = 0
     small = job.skipping and shape[0] + shape[1] <= LARGEST_SKIPPED
     useless = BEYOND * so_far
     limit = WORTH_SKIPPING * useless if small else useless
@@ -140,7 +148,6 @@ def try_residual(costs, job, search, work, trial, y0, x0, shape, kind, so_far):
     cost = error + search.weight * bits
     if not coded or not small or cost > WORTH_SKIPPING * so_far:
         return bits, error, coded
-    trial.cross[1, 0], trial.cross[1, 1] = trial.trial_cross[0], trial.trial_cross[1]
     copy_trial(
         trial.trial_decoded,
         trial.trial_levels,
@@ -170,8 +177,16 @@ def try_residual(costs, job, search, work, trial, y0, x0, shape, kind, so_far):
 @part_kernel
 def try_transform(costs, job, search, work, trial, y0, x0, shape, kind, limit):
     """As `try_residual` of an intra block, by a kind of transform; give up without a residual beyond a cost."""
-    trial.trial_skipped[0] = 2 * kind
+    trial.trial_skipped[0], trial.trial_cross[2] = 2 * kind, 0
     return _try_way(costs, job, search, work, trial, y0, x0, shape, np.int64(INTRA), 2 * kind, limit, NOTHING)
+
+
+@part_kernel
+def try_following(costs, job, search, work, trial, y0, x0, shape, limit):
+    """As `try_residual` of an intra block, by its best transform; its colours follow. Give up beyond a cost."""
+    skipped = trial.skipped[BEST]
+    trial.trial_skipped[0], trial.trial_cross[2] = skipped, 1
+    return _try_way(costs, job, search, work, trial, y0, x0, shape, np.int64(INTRA), skipped, limit, NOTHING)
 
 
 @part_kernel
@@ -187,7 +202,10 @@ def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limi
     ways = job.finer, job.dependent
     context = residual_context(job, by, bx, shape, kind)
     empty = bit_cost(costs, context, np.int64(0))
+    follows = trial.trial_cross[2]
     for p in range(3):
+        if p and follows:
+            predict_following(job, trial.trial_decoded[0], work, p, y0, x0, shape)
         least = _subtract_prediction(search, work, p, y0, x0, shape)
         without += least
         more, some, cross = _try_plane(
@@ -209,6 +227,8 @@ def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limi
             _leave(trial, work, p, shape)
             error += least
         if error + search.weight * bits > limit:
+            if follows:
+                return bits, error, 0
             least = without + search.weight * empty
             for other in range(p + 1, 3):
                 if least <= useless:
@@ -221,6 +241,10 @@ def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limi
             bits += bit_cost(costs, skipped_context(job, by, bx, shape), skipped & 1)
         if job.directed and kind == INTRA and skipped != 1:
             bits += transform_cost(costs, shape, skipped >> 1)
+        if job.guided and job.crossed and kind == INTRA:
+            bits += following_cost(costs, job, by, bx, shape, follows)
+            if follows:
+                return bits, error, 1
         if error + search.weight * bits < without + search.weight * empty:
             return bits, error, 1
         for p in range(3):
@@ -295,7 +319,8 @@ def _leave(trial, work, p, shape):
 def keep(trial, shape):
     """Note the way tried as the best one of a block."""
     h, w = sides(shape)
-    trial.cross[BEST, 0], trial.cross[BEST, 1] = trial.trial_cross[0], trial.trial_cross[1]
+    for i in range(3):
+        trial.cross[BEST, i] = trial.trial_cross[i]
     trial.skipped[BEST] = trial.trial_skipped[0]
     for p in range(3):
         for y in range(h):
@@ -308,7 +333,7 @@ def keep(trial, shape):
 def copy_trial(decoded, levels, cross, to_decoded, to_levels, to_cross, shape):
     """Copy what a way makes of a block."""
     h, w = sides(shape)
-    to_cross[0], to_cross[1] = cross[0], cross[1]
+    to_cross[0], to_cross[1], to_cross[2] = cross[0], cross[1], cross[2]
     for p in range(3):
         for y in range(h):
             for x in range(w):

@@ -24,12 +24,21 @@ from .blocks import (
     way_cost,
 )
 from .field import EIGHTH
-from .intra import MODES
+from .intra import ALL_MODES, MODES, SMOOTH, coarse
 from .intra_search import least_error, rank_directions
 from .kinds import guesses, kind_cost
 from .matching import HUGE, best_explicit, fill_products, new_match
 from .motion import best_vector, predict_in_time
-from .residual_search import BEST, copy_trial, estimated_cost, keep, new_trial, try_residual, try_transform
+from .residual_search import (
+    BEST,
+    copy_trial,
+    estimated_cost,
+    keep,
+    new_trial,
+    try_following,
+    try_residual,
+    try_transform,
+)
 from .state import CROSS_1, CROSS_2, DONE, EXPLICIT, INTRA, LOG, MIXED, PARTS, SYNTHESIS, TIMED, Job, new_work
 from .transform import sides
 
@@ -124,8 +133,21 @@ def best_block(costs, job, search, match, work, trial, y0, x0, shape):
             if total < best:
                 best, kind, index, mask, direction, coded = total, INTRA, 0, 0, mode, some
                 keep(trial, shape)
+    if job.guided and kind == INTRA and direction > SMOOTH:
+        near = _nearest_direction(costs, job, search, work, y0, x0, shape, direction)
+        if near != direction:
+            side = kind_cost(costs, job, by, bx, shape, np.int64(INTRA), np.int64(0), np.int64(0), near)
+            for p in range(3):
+                predict_direction(job, work, p, y0, x0, shape, near)
+            bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, shape, np.int64(INTRA), best)
+            total = error + search.weight * (bits + side)
+            if total < best:
+                best, direction, coded = total, near, some
+                keep(trial, shape)
     if job.directed and kind == INTRA and coded:
         best = _best_transform(costs, job, search, work, trial, y0, x0, shape, direction, best)
+    if job.guided and job.crossed and kind == INTRA and coded:
+        best = _following_first(costs, job, search, work, trial, y0, x0, shape, direction, best)
     return best, kind, index, mask, direction, coded
 
 
@@ -136,7 +158,7 @@ def _rank_by_estimates(costs, job, search, work, trial, y0, x0, shape):
     for k in range(search.intra_estimates):
         modes[k] = least_error(errors)
         errors[modes[k]] = HUGE
-    for mode in range(MODES):
+    for mode in range(ALL_MODES):
         errors[mode] = HUGE
     for k in range(search.intra_estimates):
         for p in range(3):
@@ -145,6 +167,21 @@ def _rank_by_estimates(costs, job, search, work, trial, y0, x0, shape):
         errors[modes[k]] = search.weight * side + estimated_cost(
             job, search, work, y0, x0, shape, np.int64(0), np.int64(3)
         )
+
+
+@part_kernel
+def _nearest_direction(costs, job, search, work, y0, x0, shape, direction):
+    """Of a direction and the two beside it, the one of the least estimated cost."""
+    middle, best, least = coarse(direction), direction, HUGE
+    for turn in range(3):
+        mode = middle if turn == 0 else MODES + 2 * (middle - 2) + turn - 1
+        for p in range(3):
+            predict_direction(job, work, p, y0, x0, shape, mode)
+        side = kind_cost(costs, job, y0 >> 2, x0 >> 2, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode)
+        cost = estimated_cost(job, search, work, y0, x0, shape, np.int64(0), np.int64(3)) + search.weight * side
+        if cost < least:
+            best, least = mode, cost
+    return best
 
 
 @part_kernel
@@ -166,6 +203,20 @@ def _best_transform(costs, job, search, work, trial, y0, x0, shape, mode, best):
         if some and total < best:
             best = total
             keep(trial, shape)
+    return best
+
+
+@part_kernel
+def _following_first(costs, job, search, work, trial, y0, x0, shape, mode, best):
+    """Let the colours of an intra block follow its first plane if that costs less than the best so far."""
+    side = kind_cost(costs, job, y0 >> 2, x0 >> 2, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode)
+    side *= search.weight
+    predict_direction(job, work, 0, y0, x0, shape, mode)
+    bits, error, some = try_following(costs, job, search, work, trial, y0, x0, shape, best - side)
+    total = error + search.weight * bits + side
+    if some and total < best:
+        best = total
+        keep(trial, shape)
     return best
 
 
@@ -319,7 +370,7 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, dep
     _fill(job, trial, y0, x0, shape)
     mark_block(job, by, bx, shape, leaf, kind, index, mask, direction, coded)
     job.blocks[CROSS_1, by, bx], job.blocks[CROSS_2, by, bx] = trial.cross[BEST, 0], trial.cross[BEST, 1]
-    note_skipped(job.blocks, by, bx, shape, trial.skipped[BEST] if coded else 0)
+    note_skipped(job.blocks, by, bx, shape, trial.skipped[BEST] if coded else 0, trial.cross[BEST, 2] if coded else 0)
     ways, side = part_ways(job, shape, depth), np.float32(0)
     if whole and log > LOG_LEAST:
         side = search.weight * bit_cost(costs, split_context(job, by, bx, log), 0)

@@ -18,9 +18,12 @@ from .transform import LARGEST, sides
 INTRA, EXPLICIT, SYNTHESIS, TIMED, MIXED = range(5)  # kinds of prediction
 MOST_REFERENCES = 4
 LARGE_BYTES = 1 << 20
+LIMIT = 8191  # of a decoded sample's magnitude, in eighths of an 8-bit code
 UNKNOWN = -32768  # disparity
-# What is known of each 4×4. SKIPPED is 1 without a transform, else twice its kind.
-KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, CROSS_1, CROSS_2, SKIPPED, TALL, WIDE, PARTS, FIELDS = range(14)
+# What is known of each 4×4. SKIPPED is 1 without a transform, else twice its kind; FOLLOWS if colours are predicted
+# from the first plane.
+KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, CROSS_1, CROSS_2, SKIPPED, TALL, WIDE, PARTS = range(13)
+FOLLOWS, FIELDS = 13, 14
 
 
 class Job(NamedTuple):
@@ -69,6 +72,8 @@ class Job(NamedTuple):
         Whether intra blocks have the modes and transforms of version 9.
     parted : int
         How often squares may be halved.
+    guided : int
+        Whether intra blocks have the directions of version 14.
     """
 
     views: Any
@@ -93,6 +98,7 @@ class Job(NamedTuple):
     dependent: Any = 0
     directed: Any = 0
     parted: Any = 0
+    guided: Any = 0
 
 
 class Work(NamedTuple):
@@ -108,6 +114,10 @@ class Work(NamedTuple):
     spare: Any
     border: Any
     rows: Any
+    wanted: Any  # of `signs`: what the border misses,
+    norms: Any  # its weights by row and column,
+    places: Any  # and places of coefficients, by
+    keys: Any
 
 
 def new_work() -> Work:
@@ -124,6 +134,10 @@ def new_work() -> Work:
         spare=np.zeros(square, np.int32),
         border=np.zeros((4, 2 * LARGEST + 2), np.int32),
         rows=np.zeros((LARGEST + 6, LARGEST + 8), np.int32),
+        wanted=np.zeros((2, LARGEST), np.int64),
+        norms=np.zeros((2, LARGEST), np.int64),
+        places=np.zeros(LARGEST * LARGEST, np.int64),
+        keys=np.zeros(LARGEST * LARGEST, np.int64),
     )
 
 

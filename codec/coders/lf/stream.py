@@ -15,10 +15,11 @@ from .planes import bt709_colours
 # Versions 2, 3, 5 and 6 say by their number which tools they have: factors between planes, and residuals without a
 # transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent quantiser as well,
 # version 9 other intra modes, too, version 10 halved blocks, version 11 views beside their places, version 12 bits of
-# more contexts, version 13 limited differences in the loop filter. Lossless coding still writes 2 and 3.
+# more contexts, version 13 limited differences in the loop filter, version 14 intra blocks that are guided by their
+# surroundings. Lossless coding still writes 2 and 3.
 VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED = 3, 2, 5, 6
-TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED, LIMITED = 7, 8, 9, 10, 11, 12, 13
-FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED, LIMITED
+TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED, LIMITED, GUIDED = 7, 8, 9, 10, 11, 12, 13, 14
+FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED, LIMITED, GUIDED
 _VERSIONS = {
     (False, False): UNCROSSED,
     (True, False): VERSION,
@@ -85,7 +86,9 @@ class Header:
     refined : bool
         From version 12 on: all bits with contexts are mixed, those of coefficients of more contexts.
     limited : bool
-        Version 13: the loop filter of the first plane has limited differences.
+        From version 13 on: the loop filter of the first plane has limited differences.
+    guided : bool
+        Version 14: intra blocks have more directions.
     rig : bytes
         From version 11 on: departures of views from their places on the lattice, as `rig` packs them; may be empty.
     steps : tuple of int
@@ -109,6 +112,7 @@ class Header:
     parted: bool = False
     refined: bool = False
     limited: bool = False
+    guided: bool = False
     rig: bytes = b""
     steps: tuple[int, ...]
 
@@ -145,7 +149,7 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
 def _version(header: Header) -> int:
     """Version of a payload with flags."""
     if header.refined:
-        return LIMITED if header.limited else REFINED
+        return GUIDED if header.guided else (LIMITED if header.limited else REFINED)
     return FLAGGED[header.dependent + header.directed + header.parted + bool(header.rig)]
 
 
@@ -260,6 +264,7 @@ def _read_tuned(payload: bytes) -> _Read:
         "parted": version >= PARTED,
         "refined": version >= REFINED,
         "limited": version >= LIMITED,
+        "guided": version >= GUIDED,
         "rig": rig,
     }
     return values, index, at

@@ -7,7 +7,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from raytrace_ii import load_scene
-from raytrace_ii.shapes.any_shape import AnyShape
+from raytrace_ii.files.toml_schema import AnyShape
 from raytrace_ii.tracing.kernels.noise import terrain
 from tests.raytrace_ii.shapes.test_shapes import corners, face_normals, merged
 
