@@ -291,6 +291,8 @@ def test_a_quality_is_met_by_the_measure_that_is_tuned_for(quality, tune):
 @pytest.mark.parametrize("level", first_fast([2, 0, 1, 3, 4]))
 def test_a_level_that_ends_early_is_named(level):
     picture = shifted_plane((1, 1), grid=(9, 9))
+    noise = np.random.default_rng(3).normal(0, 3, picture.pixels.shape)  # without it some levels have eight bytes
+    picture = picture.with_pixels(np.clip(picture.pixels + noise, 0, 255).astype(np.uint8))
     payload = encode(picture, "si-lf:fast", qp=12).payload
     header, levels = stream.unpack(payload, picture.pixels.size // 3)
     levels[level] = levels[level][: len(levels[level]) // 3]

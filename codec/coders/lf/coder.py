@@ -83,7 +83,7 @@ class LightField(Coder):
     options: ClassVar[Mapping[str, Option]] = {
         "stride": Option(about="binary logarithm of the first views' distance on the grid", default=3, low=0, high=6),
         "sources": Option(about="views that a synthesis is made of, 0 for none", default=4, low=0, high=8),
-        "cross": Option(about="1 to predict colours of a residual from its first plane", default=1, low=0, high=1),
+        "cross": Option(about="1 to predict colours from the first plane", default=1, low=0, high=1),
         "skip": Option(
             about="1 to code residuals of small blocks without a transform where it pays", default=1, low=0, high=1
         ),

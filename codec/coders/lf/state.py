@@ -73,7 +73,7 @@ class Job(NamedTuple):
     parted : int
         How often squares may be halved.
     guided : int
-        Whether intra blocks have the directions of version 14.
+        Whether intra blocks have what version 14 gives them: directions, colours that follow, guessed signs.
     """
 
     views: Any
