@@ -88,8 +88,8 @@ class Header:
     limited : bool
         From version 13 on: the loop filter of the first plane has limited differences.
     guided : bool
-        Version 14: intra blocks have more directions, colours that follow, and guessed signs; squares may be halved three
-        times.
+        Version 14: intra blocks have more directions, colours that follow, and guessed signs; squares may be halved
+        three times.
     rig : bytes
         From version 11 on: departures of views from their places on the lattice, as `rig` packs them; may be empty.
     steps : tuple of int
