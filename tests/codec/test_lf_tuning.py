@@ -238,7 +238,7 @@ def test_views_beside_their_places_are_predicted(monkeypatch):
     picture = moved_planes(entries)
     source = lf.Source(picture, checked_options(lf.LightField(), {}))
     payload, field = source.coded(32 * lf.FRACTIONS)
-    assert payload[0] == stream.LIMITED and payload[1] & 128
+    assert payload[0] == stream.GUIDED and payload[1] & 128
     found = rig.unpack(source.header.rig, 25, 12)
     shown = np.empty_like(picture.pixels)
     field.show(shown)
@@ -491,10 +491,13 @@ def test_the_first_view_is_finer_the_more_views_it_predicts_and_a_view_alone_is_
 
 
 @pytest.mark.slow
-def test_the_preset_best_needs_less_of_a_single_view():
-    grey = data.camera()[100:292, 100:292]
-    picture, curves = IIPicture(np.repeat(grey[..., None], 3, axis=2), grey.shape, (1, 1)), {}
-    for scheme in ("si-lf", "si-lf:best"):
-        files = [encode(picture, scheme, qp=qp) for qp in (30, 36, 42, 48)]
-        curves[scheme] = [coded.bpp for coded in files], [q_global(picture, decode(coded)) for coded in files]
-    assert bd_rate(*curves["si-lf"], *curves["si-lf:best"]) < -0.5
+def test_the_preset_best_needs_less_of_single_views():
+    """In the mean of two: the search is no finer than half a percent."""
+    saved = []
+    for grey in (data.camera()[100:292, 100:292], data.astronaut()[:192, 150:342, 1]):
+        picture, curves = IIPicture(np.repeat(grey[..., None], 3, axis=2), grey.shape, (1, 1)), {}
+        for scheme in ("si-lf", "si-lf:best"):
+            files = [encode(picture, scheme, qp=qp) for qp in (30, 36, 42, 48)]
+            curves[scheme] = [coded.bpp for coded in files], [q_global(picture, decode(coded)) for coded in files]
+        saved.append(bd_rate(*curves["si-lf"], *curves["si-lf:best"]))
+    assert np.mean(saved) < -0.5
