@@ -22,7 +22,7 @@ from .state import FOLLOWS, LIMIT, neighbours
 from .transform import inverse, sides, size_of
 
 MOST_CROSS = 4  # units
-STEEPEST = 4 << 10  # slope of the line that an intra block follows, in 2^-10
+STEEPEST_LINE = 4 << 10  # slope of the line that an intra block follows, in 2^-10
 
 
 @part_kernel
@@ -143,7 +143,7 @@ def predict_following(job, first, work, plane, y0, x0, shape):
         xs, ys, xx, xy = xs + one, ys + other, xx + one * one, xy + one * other
     spread = count * xx - xs * xs
     slope: Any = ((count * xy - xs * ys) << 10) // spread if spread > 0 else 0
-    slope = min(max(slope, -STEEPEST), STEEPEST)
+    slope = min(max(slope, -STEEPEST_LINE), STEEPEST_LINE)
     offset: Any = ((ys << 10) - slope * xs) // count + 512 if count else 0
     predicted = work.predicted[plane]
     for y in range(h):

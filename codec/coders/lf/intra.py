@@ -38,7 +38,7 @@ def coarse(mode):
 
 
 @stage_kernel
-def slope_of(mode):
+def _slope_of(mode):
     """How far a direction turns from straight in a row, in 2^-6 of a sample."""
     slope = 8 * ((coarse(mode) - 2) % (DIRECTIONS // 2) - 8)
     if mode >= MODES:
@@ -97,7 +97,7 @@ def predict_along(border, mode, shape, square, smoothed):
     """square[:h, :w] = the prediction by a direction; if that comes from the left, lying: rows are columns."""
     from_left = coarse(mode) >= FROM_LEFT
     (h, w), log, fade = sides(shape), size_of(shape), (shape[0] + shape[1] - 2) >> 2
-    slope = slope_of(mode)
+    slope = _slope_of(mode)
     first = 2 if smoothed and abs(slope) >= 8 * LEAST_SLOPES[log - 2] else 0
     side, other = border[first + (1 if from_left else 0)], border[first + (0 if from_left else 1)]
     reach, length = (w, h) if from_left else (h, w)

@@ -35,7 +35,7 @@ def _add_magnitudes(search, work, y0, x0, shape, plane, modes, smoothed, errors)
     """
     (h, w), (first, last, step) = sides(shape), modes
     own, lying, predicted = search.original[plane], work.block, work.predicted[plane]
-    if last > MODES or last > FROM_LEFT:
+    if last > FROM_LEFT:
         for y in range(h):
             for x in range(w):
                 lying[x, y] = own[np.uint64(y0 + y), np.uint64(x0 + x)]

@@ -125,30 +125,46 @@ def best_block(costs, job, search, match, work, trial, y0, x0, shape):
             if errors[mode] >= HUGE:
                 break
             errors[mode] = HUGE
-            side = kind_cost(costs, job, by, bx, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode)
-            for p in range(3):
-                predict_direction(job, work, p, y0, x0, shape, mode)
-            bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, shape, np.int64(INTRA), best)
-            total = error + search.weight * (bits + side)
+            total, some = _try_mode(costs, job, search, work, trial, y0, x0, shape, mode, best)
             if total < best:
                 best, kind, index, mask, direction, coded = total, INTRA, 0, 0, mode, some
-                keep(trial, shape)
     if job.guided and kind == INTRA and direction > SMOOTH:
         near = _nearest_direction(costs, job, search, work, y0, x0, shape, direction)
         if near != direction:
-            side = kind_cost(costs, job, by, bx, shape, np.int64(INTRA), np.int64(0), np.int64(0), near)
-            for p in range(3):
-                predict_direction(job, work, p, y0, x0, shape, near)
-            bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, shape, np.int64(INTRA), best)
-            total = error + search.weight * (bits + side)
+            total, some = _try_mode(costs, job, search, work, trial, y0, x0, shape, near, best)
             if total < best:
                 best, direction, coded = total, near, some
-                keep(trial, shape)
     if job.directed and kind == INTRA and coded:
         best = _best_transform(costs, job, search, work, trial, y0, x0, shape, direction, best)
     if job.guided and job.crossed and kind == INTRA and coded:
         best = _following_first(costs, job, search, work, trial, y0, x0, shape, direction, best)
     return best, kind, index, mask, direction, coded
+
+
+@part_kernel
+def _predict_mode(costs, job, work, y0, x0, shape, mode):
+    """work.predicted by an intra mode; return the bits that saying so takes."""
+    for p in range(3):
+        predict_direction(job, work, p, y0, x0, shape, mode)
+    return kind_cost(costs, job, y0 >> 2, x0 >> 2, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode)
+
+
+@part_kernel
+def _try_mode(costs, job, search, work, trial, y0, x0, shape, mode, best):
+    """Cost of a block by an intra mode, noted if it is less than the best so far, and whether it has a residual."""
+    side = _predict_mode(costs, job, work, y0, x0, shape, mode)
+    bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, shape, np.int64(INTRA), best)
+    total = error + search.weight * (bits + side)
+    if total < best:
+        keep(trial, shape)
+    return total, some
+
+
+@part_kernel
+def _estimated_mode(costs, job, search, work, y0, x0, shape, mode):
+    """Estimated cost of a block by an intra mode."""
+    side = search.weight * _predict_mode(costs, job, work, y0, x0, shape, mode)
+    return side + estimated_cost(job, search, work, y0, x0, shape, np.int64(0), np.int64(3))
 
 
 @part_kernel
@@ -161,12 +177,7 @@ def _rank_by_estimates(costs, job, search, work, trial, y0, x0, shape):
     for mode in range(ALL_MODES):
         errors[mode] = HUGE
     for k in range(search.intra_estimates):
-        for p in range(3):
-            predict_direction(job, work, p, y0, x0, shape, modes[k])
-        side = kind_cost(costs, job, y0 >> 2, x0 >> 2, shape, np.int64(INTRA), np.int64(0), np.int64(0), modes[k])
-        errors[modes[k]] = search.weight * side + estimated_cost(
-            job, search, work, y0, x0, shape, np.int64(0), np.int64(3)
-        )
+        errors[modes[k]] = _estimated_mode(costs, job, search, work, y0, x0, shape, modes[k])
 
 
 @part_kernel
@@ -175,10 +186,7 @@ def _nearest_direction(costs, job, search, work, y0, x0, shape, direction):
     middle, best, least = coarse(direction), direction, HUGE
     for turn in range(3):
         mode = middle if turn == 0 else MODES + 2 * (middle - 2) + turn - 1
-        for p in range(3):
-            predict_direction(job, work, p, y0, x0, shape, mode)
-        side = kind_cost(costs, job, y0 >> 2, x0 >> 2, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode)
-        cost = estimated_cost(job, search, work, y0, x0, shape, np.int64(0), np.int64(3)) + search.weight * side
+        cost = _estimated_mode(costs, job, search, work, y0, x0, shape, mode)
         if cost < least:
             best, least = mode, cost
     return best
@@ -187,11 +195,7 @@ def _nearest_direction(costs, job, search, work, y0, x0, shape, direction):
 @part_kernel
 def _best_transform(costs, job, search, work, trial, y0, x0, shape, mode, best):
     """Note another transform of an intra block if it costs less than the best so far; return the least cost."""
-    side = search.weight * kind_cost(
-        costs, job, y0 >> 2, x0 >> 2, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode
-    )
-    for p in range(3):
-        predict_direction(job, work, p, y0, x0, shape, mode)
+    side = search.weight * _predict_mode(costs, job, work, y0, x0, shape, mode)
     most = HUGE
     if search.promising:
         most = PROMISING * estimated_cost(job, search, work, y0, x0, shape, np.int64(0), np.int64(1))
@@ -209,9 +213,7 @@ def _best_transform(costs, job, search, work, trial, y0, x0, shape, mode, best):
 @part_kernel
 def _following_first(costs, job, search, work, trial, y0, x0, shape, mode, best):
     """Let the colours of an intra block follow its first plane if that costs less than the best so far."""
-    side = kind_cost(costs, job, y0 >> 2, x0 >> 2, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode)
-    side *= search.weight
-    predict_direction(job, work, 0, y0, x0, shape, mode)
+    side = search.weight * _predict_mode(costs, job, work, y0, x0, shape, mode)
     bits, error, some = try_following(costs, job, search, work, trial, y0, x0, shape, best - side)
     total = error + search.weight * bits + side
     if some and total < best:

@@ -1,7 +1,7 @@
 """Signs of an intra block's coefficients, guessed from the decoded samples above and to the left.
 
 With the right signs a block goes on from its surroundings (Henry and Clare 2017). What a sign says of the border is
-compared with what the border wants after the signs before; only the first row and column of a transform count, so
+compared with what the border wants after the signs before; only the first row and column of the residual count, so
 that a coefficient takes two products.
 """
 
