@@ -15,8 +15,7 @@ import typer
 from . import synthesize, render, pictures, calibrating, coding, evaluate, benchmarking, show, eye
 from . import depth, focus, measure_depth, observers, retarget, video
 from .common import app
-from .ending import ends_soon
-from .folders import no_empty_folders
+from .ending import ends_soon, no_empty_folders
 from .words import SPELT, one_line
 
 __all__ = [

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .folders import create_folder
+from .ending import create_folder
 from .progress import App
 from .words import one_line, say
 

@@ -1,7 +1,8 @@
-"""Interrupted commands: cleanup, and exit within two seconds."""
+"""How commands end: cleanup, exit within two seconds if interrupted, no empty folders of those that fail."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import socket
@@ -9,6 +10,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 GRACE_SECONDS = 1.5  # time limit of the cleanup, even if compiled code runs longer
@@ -84,3 +86,25 @@ def _stop(code: int, *, said: bool) -> None:
     if not said:
         os.write(2, b"interrupted\n")
     os._exit(code)
+
+
+_created: list[Path] = []  # folders created by this command
+
+
+def create_folder(folder: Path) -> None:
+    """Create a folder and its parents."""
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    _created.extend(missing)
+
+
+@contextmanager
+def no_empty_folders() -> Iterator[None]:
+    """Remove the folders that `create_folder` has created and that are empty when the block ends."""
+    _created.clear()
+    try:
+        yield
+    finally:
+        for folder in sorted(_created, key=lambda folder: len(folder.parts), reverse=True):
+            with contextlib.suppress(OSError):  # it holds files
+                folder.rmdir()

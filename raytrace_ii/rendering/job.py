@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import Counter
@@ -191,6 +192,8 @@ class Job:
     def _tile(self, rows: slice, cols: slice) -> Block:
         shape = rows.stop - rows.start, cols.stop - cols.start
         tracer = self._tracer(shape[0] * shape[1])
+        every = math.prod(self.camera.pixels) * number_of_samples(self.sampling)[0]
+        tracer.columns = packed(self.scene).columns(every)
         order = ray_order(self.camera, rows, cols, self._by_lens())
         support = self._support_room(len(order.pixels))
         if isinstance(self.sampling, Adaptive | Edges):

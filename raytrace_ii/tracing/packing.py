@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from ..scene.scene import Body, Light, Material, Scene, Vector, unit_rows
 from ..scene.textures import Image
 from . import lift
+from .columns import NO_COLUMNS, columns_across, light_columns
 from .intersect import Intersector
 from .kernels import tables
-from .kernels.arrays import Maps, Surfaces, Surroundings
+from .kernels.arrays import Columns, Maps, Surfaces, Surroundings
 from .kernels.lanes import aligned
 from .kernels.tables import DIRECTIONAL, LEAST_WEIGHT, MATERIAL_COLUMNS, POINT, SPOT
 from .texture_table import TextureTable
@@ -114,6 +115,18 @@ class PackedScene:
             self.textures.levels, self.textures.texels, self.textures.alphas,
         )  # fmt: skip
         self.surroundings = Surroundings(self.lights, self.background, self.fog, self.ambient)
+        self._columns: dict[int, Columns] = {}
+        self._making = threading.Lock()
+
+    def columns(self, rays: int) -> Columns:
+        """Columns along the light of the lamps, made on first use, if they pay for so many camera rays."""
+        size = columns_across(rays, len(self.corners), len(self.lights))
+        with self._making:
+            if size and size not in self._columns:
+                self._columns[size] = light_columns(
+                    self.corners, self.faces[: len(self.corners), :3], self.lights, size, not self.lets_through
+                )
+            return self._columns.get(size, NO_COLUMNS)
 
     @cached_property
     def plain(self) -> NDArray[np.bool_]:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core.base.checks import MOST_MM
 
 from ..scene.scene import Scene
+from .columns import NO_COLUMNS
 from .intersect import Hits
 from .kernels.addresses import addresses
 from .kernels.appearance import attenuate, look_closely, paint
@@ -244,6 +245,7 @@ class Tracer:
         self.pose = pose
         self.lobes = lobes
         self.footprint = footprint if self.scene.images else (0.0, 0.0)
+        self.columns = NO_COLUMNS  # to be set for a large picture
         self.capacity = capacity
         self.begin()
         self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
@@ -408,6 +410,7 @@ class Tracer:
         generation = Generation(
             hits, self._tools, s.intersector.first_of_same, start, rays, s.surfaces, s.surroundings, passage,
             Recorded(*images), radiance, self._shadow, following, counts, lit, self._work,
+            self.columns,
         )  # fmt: skip
         started = time.thread_time()
         self._follow(generation, self._stages(generation, support is not None, spawn))
@@ -420,7 +423,7 @@ class Tracer:
             self.count.rays["passed"] += int(counts[PASSED])
         for light in np.flatnonzero(lit):
             some = slice(light * n, light * n + lit[light])
-            self._light(_rows(self._shadow, some), radiance, tested=not counts[UNTESTED])
+            self._light(_rows(self._shadow, some), radiance, tested=self._later and not counts[UNTESTED])
         return _joined(following, int(counts[REFRACTION] + counts[PASSED]), through, int(counts[REFLECTION]))
 
     def _stages(self, generation: Generation, recorded: bool, spawn: bool) -> Stages:

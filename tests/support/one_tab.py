@@ -1,8 +1,10 @@
-"""One browser tab for all tests of a page: a page opens in it with a third of the CPU time of a new tab."""
+"""One browser tab for all tests of a page, with a third of the CPU time of new ones; pages of commands with --serve."""
 
+import threading
 from functools import partial
 from pathlib import Path
 
+from raytrace_ii.cli.server import PageServer
 from tests.support.browser import READY, true_of
 
 SMALL = {"width": 480, "height": 240}  # drawn by the processor: few pixels
@@ -71,3 +73,20 @@ def with_script(page, script, copy):
     assert text.count("<head>") == 1
     copy.write_text(text.replace("<head>", f"<head><script>{script}</script>"), encoding="utf-8")
     return copy
+
+
+def served(monkeypatch, run, words, visit):
+    """Run a command that serves a page, call ``visit`` with its address, end the server; return what `run` does."""
+    real = PageServer.serve_forever
+
+    def serve(server):
+        thread = threading.Thread(target=real, args=(server, 0.01))  # looks for its end every 10 ms
+        thread.start()
+        try:
+            visit(f"http://127.0.0.1:{server.server_port}/")
+        finally:
+            server.shutdown()
+            thread.join()
+
+    monkeypatch.setattr(PageServer, "serve_forever", serve)
+    return run(*words)

@@ -165,13 +165,26 @@ class Stages(NamedTuple):
     spawn: int
 
 
+class Columns(NamedTuple):
+    """Columns along the light of lamps, see `kernels.columns`.
+
+    ``turns`` has `NUMBERS` numbers a lamp, ``known`` ``size`` rows of ``size`` heights a lamp; of no size if there
+    are none. If faces are not ``solid``, what lies below a sheet is not known to be in shadow.
+    """
+
+    turns: Single
+    known: Single
+    size: int
+    solid: bool
+
+
 class Generation(NamedTuple):
     """One generation of rays with everything that its shading reads and fills.
 
     ``hits`` are of no rows if the kernel finds them, by ``tools``; of coincident faces the ``first_of_same`` counts,
     of no rows if there are none. Origins, directions and weights of ``rays`` are of no rows if they ``start`` within
-    the kernel. Shadow rays take n rows for each light, of which ``lit`` are filled; ``counts`` are
-    those of `tables`.
+    the kernel. Shadow rays that ``columns`` do not tell take n rows for each light, of which ``lit`` are filled;
+    ``counts`` are those of `tables`.
     """
 
     hits: Hits
@@ -189,3 +202,4 @@ class Generation(NamedTuple):
     counts: NDArray[np.int64]
     lit: NDArray[np.int64]
     work: Work
+    columns: Columns

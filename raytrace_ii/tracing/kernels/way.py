@@ -25,6 +25,7 @@ from .attributes import (
     take_rays,
     up_to_smooth,
 )
+from .columns import NUMBERS, TOLD, tell
 from .lanes import BLOCK
 from .light import add_free, in_cone, keep_rays, lift_rays, set_aside, take_left, towards_light, weigh
 from .packets import nearest_of_lanes, occluded_of_lanes
@@ -37,6 +38,7 @@ _ZERO, _TIMED = np.float32(0), np.int64(8 * BLOCK - 1)  # every eighth packet is
 # After so many rays, shadow packets that have fewer lanes than this share are filled up with those of other packets:
 # as arrays, later. So are 79 % of the lanes of *Hairdo*, 93 of *Cuboid*, 96 of *Apples* (full `setup1`, 2026-11-25).
 _TRIED, _SPARSE = 4096, 0.85
+_FEW = 10  # a packet with fewer unknown shadow rays goes through arrays, which fill packets up
 
 
 @cache
@@ -130,9 +132,15 @@ def light_up(g, first, lanes, timed, later, wide):
         in_cone(lights, light, single)
         if weigh(lights, light, single, g.counts) == 0:
             continue
+        g.counts[SHADOW_PACKETS] += 1
+        few = False
+        if g.columns.size > 0 and g.columns.turns[NUMBERS * light + TOLD] > _ZERO:
+            unknown = tell_light(g, light, first, lanes)
+            if unknown == 0:
+                continue
+            few = (unknown < _FEW) & (not later)
         lift_rays(lights, light, single)
-        if g.counts[UNTESTED] == 0:
-            g.counts[SHADOW_PACKETS] += 1
+        if g.counts[UNTESTED] == 0 and not few:
             before = ticks() if timed else 0
             calls, clear = g.tools.occluded, later and g.tools.clear.packet != 0
             for test in range(1 + clear):  # one call of a part that is inlined: two would be compiled
@@ -144,11 +152,30 @@ def light_up(g, first, lanes, timed, later, wide):
                 add_free(single)
                 take_left(single)
             g.counts[EMBREE_TICKS] += ticks() - before if timed else 0
-        if later:
+        if later or few:
             row = light * g.rays.pixels.shape[0] + g.lit[light]
             g.lit[light] += keep_rays(lanes, first, g.rays, g.shadows, row, single)
         else:
             add_free(single)
+
+
+@stage_kernel
+def tell_light(g, light, first, lanes):
+    """Add the light of one lamp where it is known to arrive; want the unknown rays alone, and return how many.
+
+    Rays that start in a body are dimmed there: they are unknown.
+    """
+    single, inside = g.work.single, 0
+    if g.rays.inside.shape[1] > 0:
+        for k in range(lanes):
+            inside += g.rays.inside[np.uint64(first + k), 0] >= 0
+    if inside > 0:
+        return BLOCK
+    unknown = tell(g.columns, light, single)
+    add_free(single)
+    for k in range(BLOCK):
+        single[at.WANTED + k] = single[at.LEFT + k]
+    return unknown
 
 
 @late_kernel

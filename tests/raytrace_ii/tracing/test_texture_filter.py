@@ -11,7 +11,7 @@ from raytrace_ii import Background, Scene, render
 from raytrace_ii.rendering.job import footprint
 from raytrace_ii.scene.textures import Image
 from raytrace_ii.shapes.primitives import rotation
-from raytrace_ii.tracing.kernels.texels import add_mixed
+from raytrace_ii.tracing.kernels.images import add_mixed
 from raytrace_ii.tracing.kernels.textures import filter_taps, logarithm
 from raytrace_ii.tracing.kernels.textures import footprint as face_footprint
 from raytrace_ii.tracing.texture_table import TextureTable, pyramid

@@ -1,0 +1,117 @@
+"""Columns along the light of lamps, by which most points of large pictures are told to be lit or in shadow."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernels.arrays import Columns
+from .kernels.columns import (
+    MATRIX,
+    NUMBERS,
+    OF_FACE,
+    OF_SHEET,
+    SLACK,
+    TOLD,
+    draw_rims,
+    draw_sheets,
+    find_mates,
+    project_faces,
+    tell_columns,
+)
+from .kernels.tables import DIRECTIONAL
+
+ROUNDING = 1e-5  # of the greatest height: a few lifts of rays
+MOST_LAMPS = 8  # that have columns
+# Columns pay if a shadow ray is traced for 12 ns more than it is told, and twice their making: 0.4 µs a face and
+# 60 ns a column (eight scenes, full setup1, 2026-11-28).
+SIZES, RAY, FACE, COLUMN, TWICE = (1024, 512), 12e-9, 0.4e-6, 60e-9, 2
+
+NO_COLUMNS = Columns(np.zeros(NUMBERS, np.float32), np.empty(0, np.float32), 0, True)
+
+
+def columns_across(rays: int, faces: int, lamps: int) -> int:
+    """Return how many columns across and down pay for so many camera rays; 0 if none do. By counts: never by time."""
+    for size in SIZES:
+        if TWICE * (FACE * faces + COLUMN * size**2 * min(lamps, MOST_LAMPS)) < RAY * rays:
+            return size
+    return 0
+
+
+def light_columns(
+    corners: NDArray[np.float32], normals: NDArray[np.float32], lights: NDArray[np.float64], size: int, solid: bool
+) -> Columns:
+    """Return the columns of lamps, ``size`` across and down.
+
+    Parameters
+    ----------
+    corners : (F, 3, 3) float32
+    normals : (F, 3) float32
+        Of unit length.
+    lights : (L, 12) float64
+        The table of `PackedScene`.
+    solid : bool
+        Whether all faces stop light; if not, only what is lit is told.
+    """
+    flat, count = corners.reshape(-1), len(corners)
+    turns, known = np.zeros((len(lights), NUMBERS), np.float32), []
+    mates, seen = np.empty(3 * count, np.int32), np.empty((count, OF_FACE))
+    find_mates(flat, np.full(1 << (6 * count).bit_length(), -1, np.int32), mates)
+    for turn, lamp in zip(turns, lights[:MOST_LAMPS], strict=False):
+        matrix = _matrix(lamp, corners, seen, size)
+        own = np.full(size * size, np.nan, np.float32)
+        known.append(own)
+        if matrix is None:
+            continue
+        slack = ROUNDING * float(np.abs(seen[:, 6:]).max())
+        rims, layers = np.full(size * size, -np.inf, np.float32), np.zeros(size * size, np.uint8)
+        draw_rims(seen, normals, mates, size, rims)
+        sheets = np.full((size * size, OF_SHEET), -np.inf, np.float32)
+        draw_sheets(seen, size, slack, sheets, layers)
+        tell_columns(sheets, layers, rims, slack, own)
+        turn[MATRIX:SLACK], turn[SLACK], turn[TOLD] = matrix.reshape(-1), slack, 1
+    return Columns(turns.reshape(-1), np.concatenate(known), size, solid)
+
+
+def _matrix(
+    lamp: NDArray[np.float64], corners: NDArray[np.float32], seen: NDArray[np.float64], size: int
+) -> NDArray[np.float64] | None:
+    """Return the matrix (4, 4) from mm to u, v, weight and h, and fill ``seen``; None if a lamp has faces all around.
+
+    The lattice encloses all faces but those that are as large as half of the scene.
+    """
+    far, place = lamp[0] == DIRECTIONAL, lamp[1:4]
+    up = -place if far else _from_faces(place, corners)
+    if up is None:
+        return None
+    side = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+    axes = np.array([side, np.cross(up, side), up]) / np.linalg.norm(side)
+    matrix = np.zeros((4, 4))
+    if far:
+        matrix[[0, 1, 3], :3], matrix[2, 3] = axes, 1
+    else:
+        matrix[:3, :3], matrix[3, 3] = axes * [[1], [1], [-1]], 1
+        matrix[:3, 3] = -matrix[:3, :3] @ place
+    project_faces(matrix.reshape(-1), corners.reshape(-1), seen)
+    for axis in (0, 1):
+        a, b, c = seen[:, 3 * axis : 3 * axis + 3].T
+        low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+        small = high - low < (high.max() - low.min()) / 2
+        if not small.any():
+            small[:] = True
+        start, end = low[small].min(), high[small].max()
+        scale = (size - 4) / max(end - start, np.finfo(np.float32).tiny)
+        matrix[axis] = scale * (matrix[axis] - start * matrix[2]) + 2 * matrix[2]
+    project_faces(matrix.reshape(-1), corners.reshape(-1), seen)
+    return matrix
+
+
+def _from_faces(place: NDArray[np.float64], corners: NDArray[np.float32]) -> NDArray[np.float64] | None:
+    """Return a unit vector along which a lamp lies beyond all faces, by the most; None if it lies among them."""
+    points = corners.reshape(-1, 3)
+    low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
+    ways = [place - (low + high) / 2, *np.eye(3), *-np.eye(3)]
+    ways = [way / length for way in ways if (length := np.linalg.norm(way)) > 0]
+    beyond = [float((place @ way) - (points @ way.astype(np.float32)).max()) for way in ways]
+    best = int(np.argmax(beyond))
+    return ways[best] if beyond[best] > 1e-3 * float(np.abs(high - low).max()) else None
