@@ -33,7 +33,7 @@ NO_COLUMNS = Columns(np.zeros(NUMBERS, np.float32), np.empty(0, np.float32), 0, 
 def columns_across(rays: int, faces: int, lamps: int) -> int:
     """Return how many columns across and down pay for so many camera rays; 0 if none do. By counts: never by time."""
     for size in SIZES:
-        if TWICE * (FACE * faces + COLUMN * size**2 * min(lamps, MOST_LAMPS)) < RAY * rays:
+        if lamps and TWICE * (FACE * faces + COLUMN * size**2 * min(lamps, MOST_LAMPS)) < RAY * rays:
             return size
     return 0
 

@@ -1,4 +1,4 @@
-"""One browser tab for all tests of a page, with a third of the CPU time of new ones; pages of commands with --serve."""
+"""One browser tab for all tests of a page: a third of the CPU time of new ones. Pages of commands with --serve."""
 
 import threading
 from functools import partial
