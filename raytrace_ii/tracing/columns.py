@@ -85,7 +85,8 @@ def _matrix(
     if up is None:
         return None
     side = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
-    axes = np.array([side, np.cross(up, side), up]) / np.linalg.norm(side)
+    side /= np.linalg.norm(side)
+    axes = np.array([side, np.cross(up, side), up])
     matrix = np.zeros((4, 4))
     if far:
         matrix[[0, 1, 3], :3], matrix[2, 3] = axes, 1

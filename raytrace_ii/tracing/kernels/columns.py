@@ -22,6 +22,7 @@ from . import lanes as at
 from .lanes import BLOCK, bits_of
 
 MARGIN = 0.25  # columns: how far beside its hit a ray may start
+NEAR = 1e-9  # columns: rounding of float64, at which both faces of an edge count
 STEEP = 0.7  # cosine between faces below which a valley is a rim: rays from a smooth surface start off its faces
 # Of a lamp: rows of the matrix for u, v, weight and h; slack of heights; 1 if there are columns.
 MATRIX, SLACK, TOLD, NUMBERS = 0, 16, 17, 18
@@ -189,13 +190,14 @@ def draw_sheets(seen, size, slack, sheets, layers):
             high = bottom if row == last else min(row + 1 + MARGIN, bottom)
             v = row + 0.5
             least, most = _reach(s, low, high)
-            left, right = _reach(s, v, v)  # middles of columns that the face covers
+            left, right = _reach(s, v, v)  # middles of columns that the face covers; on an edge both faces do
             for column in range(_column(least - MARGIN, last), _column(most + MARGIN, last) + 1):
                 u, h, i = column + 0.5, lowest, highest
                 if sloped & (row > 0) & (row < last) & (column > 0) & (column < last):
                     middle = s[H] + across * (u - s[U]) + down * (v - s[V])
                     h, i = max(middle - half, lowest), min(middle + half, highest)
-                _enter(sheets, layers, row * size + column, h, i, (u > left) & (u < right), slack)
+                covers = (u >= left - NEAR) & (u <= right + NEAR)
+                _enter(sheets, layers, row * size + column, h, i, covers, slack)
 
 
 @kernel

@@ -10,7 +10,7 @@ from raytrace_ii import Light, Scene, load_scene, render
 from raytrace_ii.tracing import packing
 from raytrace_ii.tracing.columns import MOST_LAMPS, SIZES, columns_across, light_columns
 from raytrace_ii.tracing.kernels import lanes as at
-from raytrace_ii.tracing.kernels.columns import NUMBERS, TOLD, find_mates, tell
+from raytrace_ii.tracing.kernels.columns import NUMBERS, TOLD, draw_sheets, find_mates, tell
 from raytrace_ii.tracing.kernels.tables import DIRECTIONAL, POINT
 from raytrace_ii.tracing.packing import packed
 from tests.support.slow import first_fast
@@ -123,6 +123,19 @@ def test_mates_of_edges():
         mates = np.empty(3 * len(corners), np.int32)
         find_mates(corners.astype(np.float32).reshape(-1), np.full(64, -1, np.int32), mates)
         assert mates[: len(wanted)].tolist() == wanted
+
+
+def test_a_sheet_is_counted_where_its_edge_passes_the_middle_of_a_column():
+    size, across = 8, np.array([0.0, 8.0, 8.0, 0.0])
+    for i in range(4):  # a square in u and v, parted by a diagonal through the middles of columns
+        a, b, c, d = np.roll(np.stack([across, np.roll(across, 1), 0 * across]), i, axis=1).T
+        seen = np.array([np.transpose(face).reshape(-1) for face in ((a, b, c), (c, d, a))])
+        sheets, layers = np.full((size**2, 3), -np.inf, np.float32), np.zeros(size**2, np.uint8)
+        draw_sheets(seen, size, 1e-3, sheets, layers)
+        layers = layers.reshape(size, size)
+        on = np.eye(size, dtype=bool)
+        on = on if (layers[0, 0] > 1) else on[::-1]
+        assert (layers[on] == 2).all() and (layers[~on] == 1).all()
 
 
 def test_columns_are_made_for_large_pictures_only():
