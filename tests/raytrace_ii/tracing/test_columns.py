@@ -10,7 +10,7 @@ from raytrace_ii import Light, Scene, load_scene, render
 from raytrace_ii.tracing import packing
 from raytrace_ii.tracing.columns import MOST_LAMPS, SIZES, columns_across, light_columns
 from raytrace_ii.tracing.kernels import lanes as at
-from raytrace_ii.tracing.kernels.columns import NUMBERS, TOLD, draw_sheets, find_mates, tell
+from raytrace_ii.tracing.kernels.columns import NUMBERS, TOLD, draw_sheets, find_mates, is_rim, tell
 from raytrace_ii.tracing.kernels.tables import DIRECTIONAL, POINT
 from raytrace_ii.tracing.packing import packed
 from tests.support.slow import first_fast
@@ -123,6 +123,20 @@ def test_mates_of_edges():
         mates = np.empty(3 * len(corners), np.int32)
         find_mates(corners.astype(np.float32).reshape(-1), np.full(64, -1, np.int32), mates)
         assert mates[: len(wanted)].tolist() == wanted
+
+
+@pytest.mark.parametrize(
+    ("side", "height", "rim"), [(1, -2, False), (1, 2, True), (1, 0.2, False), (-1, 0.5, True), (0, -1, True)]
+)
+def test_rims_are_folds_and_steep_valleys(side, height, rim):
+    """A level face left of an edge and another one, whose third corner is ``side`` to the right of it."""
+    corners = np.array([[[0, 0, 0], [0, 1, 0], [-1, 0, 0]], [[0, 1, 0], [0, 0, 0], [side, 0, height]]], np.float32)
+    mates = np.empty(6, np.int32)
+    find_mates(corners.reshape(-1), np.full(16, -1, np.int32), mates)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    seen = corners.transpose(0, 2, 1).reshape(2, 9).astype(float)
+    assert [bool(is_rim(seen, normals, mates, e)) for e in (0, 3)] == [rim, rim]
 
 
 def test_a_sheet_is_counted_where_its_edge_passes_the_middle_of_a_column():
