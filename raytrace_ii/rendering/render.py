@@ -40,10 +40,10 @@ class Stats:
     """Cost of a picture.
 
     ``rays`` counts rays by kind (primary, shadow, reflection, refraction), also those whose end is known without
-    Embree, ``skipped`` the rays too weak to change an 8-bit pixel. ``seconds`` is wall-clock time. ``embree_seconds`` and ``cpu_seconds`` are sums over all threads
-    and processes. ``samples`` counts pixels by their number of samples. ``embree`` is Embree's version and packet
-    size, or the reason for single rays. ``audit`` is the result of the audit, None without one; its rays are not
-    counted, its CPU seconds are.
+    Embree, ``skipped`` the rays too weak to change an 8-bit pixel. ``seconds`` is wall-clock time. ``embree_seconds``
+    and ``cpu_seconds`` are sums over all threads and processes. ``samples`` counts pixels by their number of samples.
+    ``embree`` is Embree's version and packet size, or the reason for single rays. ``audit`` is the result of the
+    audit, None without one; its rays are not counted, its CPU seconds are.
     """
 
     rays: dict[str, int]
