@@ -168,3 +168,21 @@ def reflectance(cosine, ior):
     s = math.sin(incident - refracted) / math.sin(incident + refracted)
     p = math.tan(incident - refracted) / math.tan(incident + refracted)
     return (s * s + p * p) / 2
+
+
+def on_planes(starts, ways, corners):
+    """Where rays meet the planes of faces (F, 3, 3), in float64 by Cramer's rule, as (rays, F).
+
+    Distances in lengths of a ray, how far inside the face (share of a side, below 0 outside), and the volume
+    that ray and two sides span: 0 for a face seen edge-on.
+    """
+    p = np.asarray(corners, np.float32).astype(np.float64)
+    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        across = np.cross(ways[:, None], b)
+        size = (across * a).sum(-1)
+        off = starts[:, None] - p[:, 0]
+        u = (off * across).sum(-1) / size
+        turned = np.cross(off, a)
+        v, t = (turned * ways[:, None]).sum(-1) / size, (turned * b).sum(-1) / size
+        return t, np.minimum(np.minimum(u, v), 1 - u - v), size

@@ -14,7 +14,7 @@ from raytrace_ii.tracing.kernels.columns import NUMBERS, TOLD, draw_sheets, find
 from raytrace_ii.tracing.kernels.tables import DIRECTIONAL, POINT
 from raytrace_ii.tracing.packing import packed
 from tests.support.slow import first_fast
-from tests.support.trace_scenes import body, box, floor, sphere
+from tests.support.trace_scenes import body, box, floor, on_planes, sphere
 
 
 def bowl():
@@ -43,17 +43,8 @@ def row(lamp):
 
 
 def shaded(points, ways, corners):
-    """Whether a face lies on the way from a point, and how far from its border at least the faces there are met."""
-    p = corners.astype(np.float64)
-    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        across = np.cross(ways[:, None], b)
-        size = (across * a).sum(-1)
-        off = points[:, None] - p[:, 0]
-        u = (off * across).sum(-1) / size
-        turned = np.cross(off, a)
-        v, t = (turned * ways[:, None]).sum(-1) / size, (turned * b).sum(-1) / size
-        inner = np.minimum(np.minimum(u, v), 1 - u - v)
+    """Whether a face surely lies on the way from a point, and whether one may: within rounding of its border."""
+    t, inner, _ = on_planes(points, ways, corners)
     met = (inner > -1e-4) & (t > 0) & (t < 1)
     return (met & (inner > 1e-4)).any(axis=1), met.any(axis=1)
 

@@ -14,7 +14,7 @@ from raytrace_ii.tracing.raster import Raster, parallel_views
 from raytrace_ii.tracing.sampling import EvenRays
 from raytrace_ii.tracing.tracer import start_tables
 from tests.support.slow import first_fast
-from tests.support.trace_scenes import hall, sphere
+from tests.support.trace_scenes import hall, on_planes, sphere
 
 SMALL = IICamera(pixels=(60, 40), lenses=(15, 10), pixel_pitch_mm=0.1, gap_mm=2.0)
 CAMERAS = {
@@ -53,17 +53,10 @@ def met(camera, corners, pose=None, sample=(0.5, 0.5)):
     L, D = (array.reshape(-1, 3) for array in camera.rays(sample=sample))
     L, D = L @ pose[:3, :3].T + pose[:3, 3], D @ pose[:3, :3].T
     p = np.asarray(corners, np.float32).astype(np.float64)
-    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        across = np.cross(D[:, None], b)
-        size = (across * a).sum(-1)
-        off = L[:, None] - p[:, 0]
-        u = (off * across).sum(-1) / size
-        turned = np.cross(off, a)
-        v, t = (D[:, None] * turned).sum(-1) / size, (b * turned).sum(-1) / size
-        inside = np.minimum(np.minimum(u, v), 1 - u - v)
-        edge_on = np.abs(size) < EDGE_ON * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
-        t, inside = np.where(edge_on, 0.0, t), np.where(edge_on & (inside > -1), 0.0, inside)
+    sides = np.linalg.norm(p[:, 1] - p[:, 0], axis=1) * np.linalg.norm(p[:, 2] - p[:, 0], axis=1)
+    t, inside, size = on_planes(L, D, corners)
+    edge_on = np.abs(size) < EDGE_ON * sides
+    t, inside = np.where(edge_on, 0.0, t), np.where(edge_on & (inside > -1), 0.0, inside)
     inside = np.where(np.isfinite(inside) & (t >= 0), inside, -np.inf)
     return np.where(inside >= -MARGIN, t, np.inf), inside
 
