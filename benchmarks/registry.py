@@ -178,6 +178,8 @@ BENCHMARKS = {
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.anchors", needs="imageio-ffmpeg, and the photographs of the benchmark", records=OWN,
             fills=("docs/benchmark.md",)),
+        Benchmark("coding.learnt_filter", needs="photographs in JPEG: --pictures FOLDER",
+            writes=("assets/learnt_filter.npy",)),
         Benchmark("coding.jplm", needs="jpl-encoder-bin and jpl-decoder-bin", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),

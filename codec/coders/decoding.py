@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ii_core.base.extras import NotInstalled
 
 from ..bitstream import framing
-from ..bitstream.obu import temporal_units
+from ..bitstream.framing import temporal_units
 from ..frames import Film
 
 CHUNK = 1 << 16  # bytes of a stream parsed at once

@@ -15,7 +15,7 @@ import av
 import numpy as np
 
 from ..bitstream import framing
-from ..bitstream.obu import temporal_units
+from ..bitstream.framing import temporal_units
 from ..contract import MAX_DECODED_PIXELS, Options, Pixels
 from ..frames import Film
 from .decoding import Stream, copy_plane, decoded_frames

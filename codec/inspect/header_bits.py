@@ -18,7 +18,7 @@ from ii_core import IIPicture
 from ii_core.camera.camera import whole_pair
 
 from ..api import Encoded, encode
-from ..bitstream.obu import units
+from ..bitstream.framing import units
 from ..checks import check_type
 from ..contract import MAX_PIXELS, find
 

@@ -11,8 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .cluster import Dask, cluster
-from .common import Force, Workers, app, check_only, check_outputs, check_unused, image_file, picture_files
-from .option_groups import grouped
+from .common import (
+    Force,
+    Workers,
+    app,
+    check_only,
+    check_outputs,
+    check_unused,
+    grouped,
+    image_file,
+    picture_files,
+)
 from .progress import progress_bar, say_done
 
 if TYPE_CHECKING:

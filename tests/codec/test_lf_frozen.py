@@ -1,4 +1,4 @@
-"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 14: the same bytes decode to the same pixels on every machine.
+"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 15: the same bytes decode to the same pixels on every machine.
 
 In ``tests/golden/lf.zip``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
@@ -10,8 +10,8 @@ version 8, ``directed.ii``, of version 9, and ``parted.ii``, of version 10, hold
 quantiser 32. ``rigged.ii``, of version 11, holds `moved_planes` of `test_lf_tuning`, 3×4 views of 72×64 pixels at
 quantiser 36; ``refined.ii``, of version 12, such views with noise, at quantiser 30; ``limited.ii``, of version 13,
 3×4 views of 88×72 pixels with bars, at quantiser 32; ``guided.ii``, of version 14, 2×3 views of 80×72 pixels with
-coloured bars, at quantiser 29 by `best`. The decoder has integer arithmetic alone, so that a hash of the
-pixels is the expectation.
+coloured bars, at quantiser 29 by `best`; ``learnt.ii``, of version 15, 2×3 such views with discs and noise, at
+quantiser 44. The decoder has integer arithmetic alone, so that a hash of the pixels is the expectation.
 """
 
 import contextlib
@@ -30,7 +30,7 @@ from codec import Encoded, decode
 from codec.coders.lf import stream
 from codec.coders.lf.field import Field
 from codec.coders.lf.intra import ALL_MODES, MODES
-from codec.coders.lf.loop_filter import OWN
+from codec.coders.lf.loop_filter import COMMON, OWN
 from codec.coders.lf.pyramid import ALIKE, NEAREST, _spread, pyramid
 from codec.coders.lf.state import (
     CODED,
@@ -62,6 +62,7 @@ PIXELS = {
     "refined": "f50066bc34f045614162d0f107263d80257350780e91125f6845f0af951d54ab",
     "limited": "714a575b532c883f21933a0725f6bdcab75465cb8b3cd53b5f7c71e8c3dac885",
     "guided": "1904031a5cfc9f0194580012dbadeb3ffea45ee85a97ca62c41086af495944fb",
+    "learnt": "bd19d64ead82f23cf1d5fb8ca5e3355344babb42144a9799077a209b5d596189",
     "row": "8779e10e45bc0ef8e8a3921c5f3ed192d0b0dad3092e0d9619ae1a54c87281c0",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
@@ -80,6 +81,7 @@ VERSIONS = {
     "refined": stream.REFINED,
     "limited": stream.LIMITED,
     "guided": stream.GUIDED,
+    "learnt": stream.LEARNT,
 }
 
 
@@ -114,7 +116,7 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
 
 def test_versions_are_the_numbers_in_the_streams():
     numbers = stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED
-    assert (*numbers, *stream.FLAGGED) == (2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14)
+    assert (*numbers, *stream.FLAGGED) == (2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 
 
 def test_the_third_stream_has_blocks_without_a_transform(monkeypatch):
@@ -231,6 +233,23 @@ def test_the_guided_stream_has_directions_between_and_colours_that_follow(monkey
     assert len(set(modes[kinds == INTRA]) & set(range(MODES, ALL_MODES))) > 10
     assert set(follows[kinds == INTRA]) == {0, 1} and not follows[kinds != INTRA].any()
     assert parts.max() >= 16
+
+
+def test_the_learnt_stream_has_guesses_in_the_first_levels(monkeypatch):
+    """Read as version 14, it gives another picture or none."""
+    with_guess, code = [], Field.code
+
+    def noting(field, coder, job, work, *same):
+        code(field, coder, job, work, *same)
+        with_guess.append(bool(field.filters.taps[job.at, 0, :, COMMON].any()))
+
+    coded = Encoded.load(FOLDER / "learnt.ii")
+    monkeypatch.setattr(Field, "code", noting)
+    decode(coded)
+    assert sum(with_guess) >= 3
+    with contextlib.suppress(ValueError):
+        older = decode(replace(coded, payload=bytes([stream.GUIDED]) + coded.payload[1:])).pixels
+        assert digest(older) != PIXELS["learnt"]
 
 
 def test_the_lossy_stream_has_factors_between_planes():

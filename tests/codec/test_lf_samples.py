@@ -64,7 +64,7 @@ def test_decoding_repeats_the_encoder_to_the_bit(dtype, options):
     picture = specks(dtype, grid=(3, 4), lenses=(19, 10))
     source = lf.Source(picture, checked_options(lf.LightField(), options))
     payload, field = source.coded(30 * lf.FRACTIONS)
-    assert payload[0] == stream.GUIDED
+    assert payload[0] == stream.LEARNT
     shown = np.empty_like(picture.pixels)
     field.show(shown)
     coded = encode(picture, "si-lf:cross=0" if options else "si-lf", qp=30)

@@ -1,16 +1,22 @@
 """What `si-lf` is tuned for: planes of BT.709, their scales, the header of version 7, the loop filter."""
 
+from pathlib import Path
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.lib.stride_tricks import sliding_window_view
 from skimage import data
 
+import assets
 from codec import decode, encode
 from codec.coders.lf import (
     arithmetic,
     contexts,
     denoise,
+    learnt,
     loop_filter,
     loop_filter_search,
     planes,
@@ -20,6 +26,8 @@ from codec.coders.lf import (
     stream,
 )
 from codec.coders.lf import coder as lf
+from codec.coders.lf.field import NO_GUESS
+from codec.coders.lf.state import CODED, FIELDS, TALL, WIDE
 from codec.contract import checked_options
 from ii_core import IIPicture, sub_images
 from metrics import bd_rate, q_ctc_psnr, q_global
@@ -119,6 +127,7 @@ def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, 
         refined=version >= stream.REFINED,
         limited=version >= stream.LIMITED,
         guided=version >= stream.GUIDED,
+        learnt=version >= stream.LEARNT,
         rig=rng.bytes(int(rng.integers(1, 300))) if version >= stream.RIGGED else b"",
         steps=tuple(rng.integers(1, (1 << 18) + 1, log_stride + 2).tolist()),
     )
@@ -238,7 +247,7 @@ def test_views_beside_their_places_are_predicted(monkeypatch):
     picture = moved_planes(entries)
     source = lf.Source(picture, checked_options(lf.LightField(), {}))
     payload, field = source.coded(32 * lf.FRACTIONS)
-    assert payload[0] == stream.GUIDED and payload[1] & 128
+    assert payload[0] == stream.LEARNT and payload[1] & 128
     found = rig.unpack(source.header.rig, 25, 12)
     shown = np.empty_like(picture.pixels)
     field.show(shown)
@@ -258,7 +267,7 @@ def test_views_in_their_places_have_no_rig(places):
     assert not lf.Source(picture, checked_options(lf.LightField(), {})).header.rig
 
 
-def filtered_by_definition(view, modes, taps, limit):
+def filtered_by_definition(view, modes, taps, limit, guess):
     """The filter by its definition in docs/lf.md, with arrays shifted as a whole."""
     planes_, (height, width) = view.astype(np.int64), view.shape[1:]
 
@@ -284,7 +293,7 @@ def filtered_by_definition(view, modes, taps, limit):
     for p, mode in enumerate(modes):
         if mode:
             odd = [moved(planes_[p], *by) - moved(planes_[p], -by[0], -by[1]) for by in pairs[:2]]
-            found = even(planes_[p]) + odd + (even(planes_[0]) if p else limited)
+            found = even(planes_[p]) + odd + (even(planes_[0]) if p else [*limited, guess])
             weights = taps[p].astype(np.int64)[classes * (0, 1, 4, 8)[mode] // 8]
             total = sum(weights[..., i] * difference for i, difference in enumerate(found))
             out[p] = np.clip(planes_[p] + ((total + 128) >> 8), -8191, 8191)
@@ -302,15 +311,16 @@ def test_a_view_is_filtered_as_defined(modes, shape, limit):
     filters = loop_filter.new_filters(2)
     filters.modes[1] = modes
     filters.taps[1] = rng.integers(-127, 128, filters.taps[1].shape)
-    expected = filtered_by_definition(views[1], modes, filters.taps[1], limit)
+    guess = rng.integers(-100, 100, shape, np.int32) if limit else np.zeros((0, 0), np.int32)
+    expected = filtered_by_definition(views[1], modes, filters.taps[1], limit, guess if limit else 0)
     other = views[0].copy()
-    loop_filter.filter_view(views, 1, filters, np.int32(limit), *loop_filter.memory(*shape))
+    loop_filter.filter_view(views, 1, filters, np.int32(limit), guess, *loop_filter.memory(*shape))
     np.testing.assert_array_equal(views[1], expected)
     np.testing.assert_array_equal(views[0], other)
 
 
-@pytest.mark.parametrize("limited", [0, 1])
-def test_filters_are_read_as_they_were_written(limited):
+@pytest.mark.parametrize("own", [loop_filter.OWN, loop_filter.COMMON, loop_filter.TAPS])
+def test_filters_are_read_as_they_were_written(own):
     """Several views: not filtered, with new filters in each precision, and with those before."""
     rng = np.random.default_rng(9)
     written, read = loop_filter.new_filters(12), loop_filter.new_filters(12)
@@ -319,13 +329,13 @@ def test_filters_are_read_as_they_were_written(limited):
         same = int(rng.integers(8)) if view else 0
         for p in range(3):
             mode = written.modes[view, p] = rng.integers(4)
-            taps, shift = loop_filter.TAPS if p or limited else loop_filter.OWN, int(rng.integers(4))
+            taps, shift = loop_filter.COMMON if p else own, int(rng.integers(4))
             values = rng.integers(-(127 >> shift), (127 >> shift) + 1, (loop_filter.COUNTS[mode], taps)) << shift
             written.taps[view, p, : len(values), :taps] = values
-        loop_filter.code_filter(coder, written, view, same, limited)
+        loop_filter.code_filter(coder, written, view, same, own)
     reader = arithmetic.reader(contexts.starting_contexts(), arithmetic.finish(coder))
     for view in range(12):
-        loop_filter.code_filter(reader, read, view, 0, limited)
+        loop_filter.code_filter(reader, read, view, 0, own)
     for one, other in zip(written, read, strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -337,10 +347,10 @@ def test_least_squares_undo_a_blur_and_the_gain_is_the_error_that_they_save():
     views = ((4 * original.astype(int) + sums) // 8).astype(np.int16)[None]
     before = np.square(views[0].astype(float) - original).sum(axis=(1, 2))
     weight = 2000.0
-    found = loop_filter_search.search_filters(views, 0, original, np.int32(0), weight)
+    found = loop_filter_search.search_filters(views, 0, original, np.int32(0), NO_GUESS, weight)
     filters = loop_filter.new_filters(1)
     filters.modes[0], filters.taps[0] = found.modes, found.taps
-    loop_filter.filter_view(views, 0, filters, np.int32(0), *loop_filter.memory(40, 48))
+    loop_filter.filter_view(views, 0, filters, np.int32(0), NO_GUESS, *loop_filter.memory(40, 48))
     saved = before - np.square(views[0].astype(float) - original).sum(axis=(1, 2))
     assert (saved > 0.4 * before).all()
     # Bits of three filters of 8 to 14 taps lie between 10 and 2000; rounding adds 1/12 a sample.
@@ -357,11 +367,78 @@ def test_limited_differences_take_noise_beside_an_edge_and_leave_the_edge():
     left = []
     for limit in np.int32(0), np.int32(40):
         views, filters = noisy[None].copy(), loop_filter.new_filters(1)
-        found = loop_filter_search.search_filters(views, 0, original, limit, 1.0)
+        found = loop_filter_search.search_filters(views, 0, original, limit, NO_GUESS, 1.0)
         filters.modes[0], filters.taps[0] = found.modes, found.taps
-        loop_filter.filter_view(views, 0, filters, limit, *loop_filter.memory(48, 64))
+        loop_filter.filter_view(views, 0, filters, limit, NO_GUESS, *loop_filter.memory(48, 64))
         left.append(np.square(views[0, 0].astype(float) - original[0]).sum())
     assert left[1] < left[0] / 3
+
+
+def weights_in_file():
+    """Arrays as docs/lf.md lists them."""
+    numbers, c, layers = np.load(Path(assets.__file__).with_name("learnt_filter.npy")), 24, 3
+    shapes = (c, 27), (layers, c, c, 9), (c, 9), (layers + 1, c)
+    ends = np.cumsum([np.prod(shape) for shape in shapes])
+    assert ends[-1] == len(numbers) and numbers.dtype == np.int16
+    return [part.reshape(s).astype(np.int64) for part, s in zip(np.split(numbers, ends), shapes, strict=False)]
+
+
+def guessed_by_definition(plane, blocks, step):
+    """The guess by its definition in docs/lf.md, in int64, layer by layer."""
+    net, reach = weights_in_file(), learnt.REACH
+    around = np.pad(plane.astype(np.int64), reach + 2, mode="edge")
+    height, width = plane.shape[0] + 2 * reach, plane.shape[1] + 2 * reach
+    own = around[2:-2, 2:-2]
+    inputs = [
+        np.clip(around[i : i + height, j : j + width] - own, -(step >> 3), step >> 3) * ((1 << 26) // step) >> 16
+        for i, j in np.ndindex(5, 5)
+        if (i, j) != (2, 2)
+    ]
+    y, x = np.indices(plane.shape)
+    tall, wide, coded = (blocks[k].repeat(4, axis=0).repeat(4, axis=1).astype(int) for k in (TALL, WIDE, CODED))
+    beside = [(at % (1 << side) == 0) | ((at + 1) % (1 << side) == 0) for at, side in ((x, wide), (y, tall))]
+    inputs += [np.pad(64 * mark.astype(int), reach) for mark in (*beside, coded > 0)]
+    hidden = np.clip((np.einsum("oi,iyx->oyx", net[0], inputs) + net[3][0][:, None, None]) >> 8, 0, 255)
+    for weights, biases in zip(net[1].reshape(len(net[1]), -1, len(hidden), 3, 3), net[3][1:], strict=True):
+        windows = sliding_window_view(hidden, (3, 3), axis=(1, 2))
+        hidden = np.clip((np.einsum("oimn,iyxmn->oyx", weights, windows) + biases[:, None, None]) >> 8, 0, 255)
+    windows = sliding_window_view(hidden, (3, 3), axis=(1, 2))
+    part = np.clip(np.einsum("imn,iyxmn->yx", net[2].reshape(-1, 3, 3), windows) >> 7, -4096, 4096)
+    return (part * step + (1 << 15)) >> 16
+
+
+@pytest.mark.parametrize("step", [1, 580, 2580, 1 << 18])
+def test_a_network_guesses_as_defined(step):
+    rng = np.random.default_rng(step)
+    views = np.clip(rng.normal(0, step / 40, (2, 3, 24, 36)), -8191, 8191).astype(np.int16)
+    blocks = np.zeros((FIELDS, 6, 9), np.int16)
+    blocks[TALL], blocks[WIDE], blocks[CODED] = 3, rng.integers(2, 4, (6, 9)), rng.integers(2, size=(6, 9))
+    memory = learnt.memory(24, 36)
+    learnt.guess(views, 1, blocks, step, learnt.net(), *memory)
+    np.testing.assert_array_equal(memory[-1], guessed_by_definition(views[1, 0], blocks, step))
+    assert step == 1 or np.abs(memory[-1]).max() > 0
+
+
+def test_sums_of_a_network_are_exact_in_float32():
+    """Below 2^24 in any order."""
+    first, between, last, biases = (np.abs(part) for part in weights_in_file())
+    assert 128 * first[:, :-3].sum(axis=1).max() + 64 * first[:, -3:].sum(axis=1).max() + biases[0].max() < 1 << 24
+    assert 255 * between.sum(axis=(2, 3)).max() + biases.max() < 1 << 24
+    assert 255 * last.sum() < 1 << 24
+
+
+def test_a_network_guesses_what_a_photograph_lacks():
+    """One on which it was not trained: with the guess the filter saves more error than without."""
+    picture = IIPicture(np.ascontiguousarray(data.astronaut()[20:180, 140:300]), (160, 160), (1, 1))
+    saved, search = [], loop_filter_search.search_filters
+
+    def searched(views, view, original, limit, guess, weight):
+        saved.extend(search(views, view, original, limit, part, weight).gains[0] for part in (guess, NO_GUESS))
+        return search(views, view, original, limit, guess, weight)
+
+    with patch.object(loop_filter_search, "search_filters", searched):
+        encode(picture, "si-lf", qp=44)
+    assert saved[0] > 1.4 * saved[1] > 0
 
 
 def smooth_plane(grid, height, width):

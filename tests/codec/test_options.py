@@ -8,7 +8,7 @@ import pytest
 
 from codec import decode, encode, schemes
 from codec.bitstream import framing
-from codec.bitstream.obu import temporal_units
+from codec.bitstream.framing import temporal_units
 from codec.coders.decoding import stream_packets
 from codec.coders.pseudo_video import PseudoVideo
 from codec.contract import find, parse_scheme

@@ -1,5 +1,8 @@
-"""Encoders of pseudo video sequences: settings, rates, structure of streams."""
+"""Encoders of pseudo video sequences: settings, rates, structure of streams; CPU time of their threads."""
 
+import os
+import threading
+import time
 from fractions import Fraction
 
 import av
@@ -7,9 +10,12 @@ import numpy as np
 import pytest
 
 from codec import decode, encode
+from codec.clock import TASKS, OwnThreads, cpu_seconds
+from codec.coders.video import open_encoder
 from codec.coders.x264 import START_CODE, without_sei
 from codec.contract import parse_scheme
 from codec.order import ORDERS
+from ii_core import IIPicture
 from tests.codec.test_contract import large, psnr, textured
 from tests.support.slow import first_fast
 
@@ -131,3 +137,41 @@ def test_high_target_rates_take_lossless_coding(more):
     assert coded.payload == lossless.payload
     assert coded.runs == 1
     assert coded.reached == (more == 1.0)
+
+
+ON_LINUX = pytest.mark.skipif(not os.path.isdir(TASKS), reason="only Linux tells the time of each thread")
+
+
+@ON_LINUX
+def test_cpu_time_excludes_threads_of_others():
+    """Threads that have ended, and Python's own threads, are distinguished from those of the encoder."""
+    ended = threading.Thread(target=lambda: None)
+    ended.start()
+    ended.join()
+    stop = threading.Event()
+
+    def busy():
+        while not stop.is_set():
+            sum(range(1000))
+
+    python = threading.Thread(target=busy)
+    python.start()
+    time.sleep(0.05)
+    own = OwnThreads(lambda: None)
+    own._ids = {ended.native_id, python.native_id}
+    before = cpu_seconds()
+    own.end()
+    assert cpu_seconds() - before < 0.02
+    stop.set()
+    python.join()
+
+
+@ON_LINUX
+def test_no_encoder_makes_the_process_a_real_time_task():
+    """SVT-AV1 run by root does: other processes of the machine then got no CPU time."""
+    coder, options = parse_scheme("si-av1:fast")
+    film = coder.film(IIPicture(np.zeros((64, 128, 3), np.uint8), (8, 4), (16, 16)), options)
+    context = open_encoder(coder, film, coder.constant(30, film, options))
+    usual = os.sched_getscheduler(0)
+    OwnThreads(context.open)
+    assert {os.sched_getscheduler(int(number)) for number in os.listdir(TASKS)} == {usual}

@@ -291,6 +291,7 @@ class Source:
             refined=not exact,
             limited=not exact,
             guided=not exact,
+            learnt=not exact,
             rig=b"" if entries is None else rig.pack(entries, self.grid[0] // 2 * self.grid[1] + self.grid[1] // 2),
             steps=(),
         )
@@ -459,7 +460,8 @@ class Source:
         filters = None
         if field.header.filtered:
             limit = field.limit(job.step)
-            filters = loop_filter_search.search_filters(field.views, job.at, original, limit, worth(job.step))
+            guess = field.guess(node, job)
+            filters = loop_filter_search.search_filters(field.views, job.at, original, limit, guess, worth(job.step))
         return job, made, filters
 
     def _target(self, field: Field, node: Node) -> NDArray[np.int16]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import loop_filter, motion, rig, synthesis
+from . import learnt, loop_filter, motion, rig, synthesis
 from .agreement import new_matching
 from .arithmetic import Arithmetic
 from .blocks import MOST_HALVINGS, MOST_INDEX, code_view
@@ -23,6 +23,8 @@ from .warp import LATTICE, UNSHIFTED
 
 EIGHTH = 32  # of a sample, in units of disparity
 MOST_SEARCHED = 800  # disparities of one view
+LEARNT_LEVELS = 2  # of views whose first plane is guessed by `learnt`
+NO_GUESS = np.zeros((0, 0), np.int32)
 FIRST_AGAIN = 0, 2  # views of the second level after which the first view's disparity is found anew
 
 
@@ -116,7 +118,7 @@ class Field:
         """
         code_view(coder, job, work)
         if self.header.filtered:
-            loop_filter.code_filter(coder, self.filters, job.at, same, int(self.header.limited))
+            loop_filter.code_filter(coder, self.filters, job.at, same, self._own_taps())
         if self.header.exact:
             exact = self._exact
             rotation, sixteen = self.header.colours, exact.pixels.itemsize == 2
@@ -129,6 +131,20 @@ class Field:
     def limit(self, step: int) -> np.int32:
         """Of a loop filter's limited differences, at a quantiser's step: a quarter of it; 0 without them."""
         return np.int32(max(step >> 6, 1) if self.header.limited else 0)
+
+    def _own_taps(self) -> int:
+        """Of a loop filter, in the first plane."""
+        if self.header.learnt:
+            return loop_filter.TAPS
+        return loop_filter.COMMON if self.header.limited else loop_filter.OWN
+
+    def guess(self, node: Node, job: Job) -> NDArray[np.int32]:
+        """What the first plane of a decoded view lacks, as `learnt` guesses it, in the first levels; else nothing."""
+        if not self.header.learnt or node.level >= LEARNT_LEVELS:
+            return NO_GUESS
+        memory = learnt.memory(*self.shape)
+        learnt.guess(self.views, job.at, job.blocks, job.step, learnt.net(), *memory)
+        return np.asarray(memory[-1])
 
     def view_pixels(self, number: int) -> NDArray[Any]:
         """A decoded view, (H, W, 3)."""
@@ -148,9 +164,10 @@ class Field:
     def refine(self, node: Node, job: Job, made: Synthesis) -> None:
         """Filter a decoded view, and note its disparity, for those that follow."""
         if self.header.filtered and self.filters.modes[job.at].any():
-            loop_filter.filter_view(
-                self.views, job.at, self.filters, self.limit(job.step), *loop_filter.memory(*self.shape)
-            )
+            wanted = self.filters.modes[job.at, 0] and self.filters.taps[job.at, 0, :, loop_filter.COMMON].any()
+            guess = self.guess(node, job) if wanted else NO_GUESS
+            limit, memory = self.limit(job.step), loop_filter.memory(*self.shape)
+            loop_filter.filter_view(self.views, job.at, self.filters, limit, guess, *memory)
         if (node.row, node.col) not in self.used or not (len(made.sources) or self.past):
             return
         synthesis.start(made, job.at, job.blocks, job.unit, job.synthesised)

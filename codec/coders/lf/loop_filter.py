@@ -4,7 +4,8 @@ After Wiener filters in video coding (Tsai et al. 2013, adaptive loop filter). A
 ``(Σ tap · difference + 128) >> 8``. Differences are those of two opposite neighbours' sum from twice the sample,
 of two opposite neighbours (they move a plane by parts of a sample), in the second and third plane, of the first
 plane's neighbours, and in the first plane those of neighbours from the sample, each limited: they smooth beside an
-edge and leave the edge. All planes are filtered from the decoded ones before any filter.
+edge and leave the edge; and what a `learnt` network guesses. All planes are filtered from the decoded ones before any
+filter.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from .state import LIMIT
 from .warp import clamped
 
 # Six even pairs, two odd ones, and six even of the first plane: if it is filtered itself, limited ones, from version
-# 13 on. `find_differences` lists them.
-TAPS, OWN = 14, 8
-GROUPS = np.array([0, 0, 1, 1, 1, 1, 2, 2, 3, 3, 3, 3, 3, 3])  # of contexts, by tap
+# 13 on, and from version 15 on what a network guesses. `find_differences` lists them.
+TAPS, OWN, COMMON = 15, 8, 14
+GROUPS = np.array([0, 0, 1, 1, 1, 1, 2, 2, 3, 3, 3, 3, 3, 3, 3])  # of contexts, by tap
 CLASSES = 8
 COUNTS = 0, 1, 4, 8  # classes of a filter, by its mode; 0: not filtered
 BORDER = 2
@@ -65,10 +66,10 @@ def new_filters(views: int) -> Filters:
 
 
 @lean_kernel
-def code_filter(coder, filters, view, same, limited):
+def code_filter(coder, filters, view, same, own):
     """Write or read the filters of a view; bit p of ``same`` says that of plane p is the one coded last.
 
-    ``limited`` says whether the first plane has limited differences.
+    ``own`` is the number of the first plane's taps.
     """
     modes, taps = filters.modes, filters.taps
     for p in range(3):
@@ -88,7 +89,7 @@ def code_filter(coder, filters, view, same, limited):
             if several:
                 several += code_bit(coder, np.int64(at.FILTER_CLASSES + 2 * p + 1), 1 if mode > 2 else 0)
             modes[view, p] = 1 + several
-            count, length = 1 if several == 0 else 2 << several, TAPS if p or limited else OWN
+            count, length = 1 if several == 0 else 2 << several, COMMON if p else own
             _code_taps(coder, taps[view, p], 1 if p else 0, count, length)
             filters.latest[p] = view
 
@@ -115,8 +116,11 @@ def _code_taps(coder, taps, plane, count, length):
 
 
 @lane_stage
-def find_differences(planes, p, y, limit, found):
-    """found[:TAPS, :W] = differences of a row's samples from their neighbours; planes are (3, H + 4, W + 4)."""
+def find_differences(planes, p, y, limit, guess, found):
+    """found[:TAPS, :W] = differences of a row's samples from their neighbours; planes are (3, H + 4, W + 4).
+
+    ``guess`` (H, W) is what the first plane lacks; without rows it is 0.
+    """
     plane = planes[p]
     outer, above, row, below, last = plane[y], plane[y + 1], plane[y + 2], plane[y + 3], plane[y + 4]
     _find_even(outer, above, row, below, last, found)
@@ -137,6 +141,13 @@ def find_differences(planes, p, y, limit, found):
             found[11, x] = _limited(above[x + THREE], own, limit) + _limited(below[x + ONE], own, limit)
             found[12, x] = _limited(row[x], own, limit) + _limited(row[x + FOUR], own, limit)
             found[13, x] = _limited(outer[x + TWO], own, limit) + _limited(last[x + TWO], own, limit)
+    if p == 0 and len(guess):
+        row = guess[y]
+        for i in range(found.shape[1]):
+            found[14, np.uint64(i)] = row[np.uint64(i)]
+    else:
+        for i in range(found.shape[1]):
+            found[14, np.uint64(i)] = 0
 
 
 @lane_stage
@@ -239,7 +250,7 @@ def _add_by_class(classes, taps, k, shift, row, total):
 
 
 @lane_kernel
-def filter_view(views, view, filters, limit, planes, activity, classes, bins, found):
+def filter_view(views, view, filters, limit, guess, planes, activity, classes, bins, found):
     """Filter a decoded view.
 
     Parameters
@@ -249,6 +260,8 @@ def filter_view(views, view, filters, limit, planes, activity, classes, bins, fo
     filters : Filters
     limit : int32
         Of limited differences; with 0 they are 0.
+    guess : ndarray of int32, (H, W) or (0, 0)
+        What the first plane lacks, by `learnt`.
     planes : ndarray of int16, (3, H + 4, W + 4)
         Memory, as all that follows.
     activity : ndarray of int32, (2, H + 4, W + 4)
@@ -268,7 +281,7 @@ def filter_view(views, view, filters, limit, planes, activity, classes, bins, fo
             taps = filters.taps[view, p]
             shift = np.uint8(3 if mode == 1 else 3 - mode)
             for y in range(height):
-                find_differences(planes, p, y, limit, found)
+                find_differences(planes, p, y, limit, guess, found)
                 for i in range(width):
                     total[np.uint64(i)] = 128
                 for k in range(TAPS):

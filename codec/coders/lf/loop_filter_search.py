@@ -67,7 +67,7 @@ class Found(NamedTuple):
 
 
 @lane_kernel
-def _add_moments(views, view, original, limit, planes, activity, classes, bins, found, moments, waiting):
+def _add_moments(views, view, original, limit, guess, planes, activity, classes, bins, found, moments, waiting):
     """Add the sums of a view; of products those with an earlier difference or itself."""
     height, width = classes.shape
     with_border(views, view, planes)
@@ -76,7 +76,7 @@ def _add_moments(views, view, original, limit, planes, activity, classes, bins, 
     for p in range(3):
         counts[:] = 0
         for y in range(height):
-            find_differences(planes, p, y, limit, found)
+            find_differences(planes, p, y, limit, guess, found)
             errors, own, decoded = found[TAPS], original[p, y], views[view, p, y]
             for x in range(width):
                 errors[x] = np.int32(own[x]) - np.int32(decoded[x])
@@ -114,12 +114,17 @@ def _product(one, other):
 
 
 def search_filters(
-    views: NDArray[np.int16], view: int, original: NDArray[np.int16], limit: np.int32, weight: float
+    views: NDArray[np.int16],
+    view: int,
+    original: NDArray[np.int16],
+    limit: np.int32,
+    guess: NDArray[np.int32],
+    weight: float,
 ) -> Found:
     """Return the best new filters of a decoded view; ``weight`` is the squared error that a bit is worth."""
     moments = Moments(np.zeros((3, CLASSES, TAPS, TAPS)), np.zeros((3, CLASSES, TAPS)), np.zeros(CLASSES))
     waiting = np.zeros((CLASSES, TAPS + 1, GROUP))
-    _add_moments(views, view, original, limit, *memory(*views.shape[2:]), moments, waiting)
+    _add_moments(views, view, original, limit, guess, *memory(*views.shape[2:]), moments, waiting)
     moments.products[:] += np.tril(moments.products, -1).swapaxes(2, 3)
     modes, taps, gains = [], np.zeros((3, CLASSES, TAPS), np.int64), []
     for p in range(3):

@@ -16,10 +16,19 @@ from .planes import bt709_colours
 # transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent quantiser as well,
 # version 9 other intra modes, too, version 10 halved blocks, version 11 views beside their places, version 12 bits of
 # more contexts, version 13 limited differences in the loop filter, version 14 intra blocks that are guided by their
-# surroundings. Lossless coding still writes 2 and 3.
+# surroundings, version 15 a learnt loop filter. Lossless coding still writes 2 and 3.
 VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED = 3, 2, 5, 6
-TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED, LIMITED, GUIDED = 7, 8, 9, 10, 11, 12, 13, 14
-FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED, LIMITED, GUIDED
+FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED, RIGGED, REFINED, LIMITED, GUIDED, LEARNT = (
+    7,
+    8,
+    9,
+    10,
+    11,
+    12,
+    13,
+    14,
+    15,
+)
 _VERSIONS = {
     (False, False): UNCROSSED,
     (True, False): VERSION,
@@ -88,8 +97,10 @@ class Header:
     limited : bool
         From version 13 on: the loop filter of the first plane has limited differences.
     guided : bool
-        Version 14: intra blocks have more directions, colours that follow, and guessed signs; squares may be halved
-        three times.
+        From version 14 on: intra blocks have more directions, colours that follow, and guessed signs; squares may be
+        halved three times.
+    learnt : bool
+        From version 15 on: the loop filter of the first plane has a network's guess in the first two levels.
     rig : bytes
         From version 11 on: departures of views from their places on the lattice, as `rig` packs them; may be empty.
     steps : tuple of int
@@ -114,6 +125,7 @@ class Header:
     refined: bool = False
     limited: bool = False
     guided: bool = False
+    learnt: bool = False
     rig: bytes = b""
     steps: tuple[int, ...]
 
@@ -150,7 +162,7 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
 def _version(header: Header) -> int:
     """Version of a payload with flags."""
     if header.refined:
-        return GUIDED if header.guided else (LIMITED if header.limited else REFINED)
+        return REFINED + header.limited + header.guided + header.learnt
     return FLAGGED[header.dependent + header.directed + header.parted + bool(header.rig)]
 
 
@@ -266,6 +278,7 @@ def _read_tuned(payload: bytes) -> _Read:
         "refined": version >= REFINED,
         "limited": version >= LIMITED,
         "guided": version >= GUIDED,
+        "learnt": version >= LEARNT,
         "rig": rig,
     }
     return values, index, at
