@@ -5,8 +5,7 @@
 ``FOLDER`` holds JPEG photographs, here the 500 of the Berkeley Segmentation Data Set (BSDS500, `BIDS/BSDS500` on
 GitHub, ``BSDS500/data/images``); none is used to measure the coder. A part of each, at a random size, is coded as one
 view at two quantisers. The network minimises the squared error of the first plane, each picture's in parts of what it
-is without (Adam: Kingma and Ba 2015). Written is ``assets/learnt_filter.npy``; what it gains on every eighth picture,
-on which a first network is not trained, is printed.
+is without (Adam: Kingma and Ba 2015). Written is ``assets/learnt_filter.npy``, after 25 minutes on two cores.
 """
 
 from __future__ import annotations
@@ -50,10 +49,15 @@ def main() -> None:
     """Train, and write the weights."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pictures", type=Path, required=True, help="folder of JPEG photographs")
-    names = sorted(parser.parse_args().pictures.rglob("*.jpg"))
+    folder = parser.parse_args().pictures
+    names = sorted(folder.rglob("*.jpg"))
+    if not names:
+        parser.error(f"{folder} has no *.jpg")
     with ProcessPoolExecutor() as pool:
         samples = list(pool.map(samples_of, range(len(names)), names, chunksize=8))
-    np.save(WEIGHTS, whole(trained([sample for each in samples for sample in each])))
+    part = WEIGHTS.with_suffix(".part.npy")
+    np.save(part, whole(trained([sample for each in samples for sample in each])))
+    part.replace(WEIGHTS)
 
 
 def samples_of(seed: int, name: Path) -> list[Sample]:

@@ -11,6 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from skimage import data
 
 import assets
+from benchmarks.coding import learnt_filter
 from codec import decode, encode
 from codec.coders.lf import (
     arithmetic,
@@ -417,6 +418,39 @@ def test_a_network_guesses_as_defined(step):
     learnt.guess(views, 1, blocks, step, learnt.net(), *memory)
     np.testing.assert_array_equal(memory[-1], guessed_by_definition(views[1, 0], blocks, step))
     assert step == 1 or np.abs(memory[-1]).max() > 0
+
+
+def test_training_follows_the_slopes_of_the_error_of_what_the_decoder_computes():
+    """The script's forward pass is the decoder's guess but for rounding; its slopes are quotients of differences."""
+    first, between, last, biases = weights_in_file()
+    parts = [first.T / 256]
+    for layer, own in zip(between, biases, strict=False):
+        parts += [own / (1 << 14), layer.reshape(24, 24, 9).transpose(2, 1, 0).reshape(216, 24) / 256]
+    net = [*parts, biases[-1] / (1 << 14), last.T.reshape(216, 1) / (1 << 14), np.zeros(1)]
+    np.testing.assert_array_equal(
+        learnt_filter.whole(net), np.load(Path(assets.__file__).with_name("learnt_filter.npy"))
+    )
+    rng, step, m = np.random.default_rng(0), 2580, learnt.MARGIN
+    views = np.clip(rng.normal(0, step / 40, (1, 3, 24, 36)), -8191, 8191).astype(np.int16)
+    blocks = np.zeros((FIELDS, 6, 9), np.int16)
+    blocks[TALL], blocks[WIDE], blocks[CODED] = 3, 2, rng.integers(2, size=(6, 9))
+    memory = learnt.memory(24, 36)
+    learnt.guess(views, 0, blocks, step, learnt.net(), *memory)
+    marks = np.pad(learnt_filter.marks_of(blocks, (24, 36)), ((m, m), (m, m), (0, 0)))
+    plane = np.pad(views[0, 0] / (step / 16), m, mode="edge")
+    inputs = learnt_filter.inputs_of(plane, marks)[None]
+    guess = learnt_filter.forward(net, inputs)[0][0] * step / 16
+    np.testing.assert_allclose(memory[-1] / 2, guess, atol=0.03 * step / 16)
+    assert np.std(guess) > 0.02 * step / 16
+    lacks, weights = rng.normal(0, 0.1, (1, 24, 36)), np.ones(1)
+    slopes = learnt_filter.slopes_of(net, inputs, lacks, weights)
+    for part, slope in zip(net, slopes, strict=True):
+        at, kept, errors = np.unravel_index(np.argmax(np.abs(slope)), slope.shape), part.copy(), []
+        for moved in (1e-5, -1e-5):
+            part[at] = kept[at] + moved
+            errors.append(np.mean((learnt_filter.forward(net, inputs)[0] - lacks) ** 2))
+        part[at] = kept[at]
+        assert (errors[0] - errors[1]) / 2e-5 == pytest.approx(slope[at], rel=0.02)
 
 
 def test_sums_of_a_network_are_exact_in_float32():
