@@ -26,6 +26,7 @@ from codec.coders.lf import learnt, loop_filter_search
 from codec.coders.lf.field import Field
 from codec.coders.lf.state import CODED, TALL, WIDE
 from ii_core import IIPicture
+from ii_core.base.atomic import atomic_path
 from ii_core.base.files import read_image
 
 WEIGHTS = ROOT / "assets" / "learnt_filter.npy"
@@ -55,9 +56,9 @@ def main() -> None:
         parser.error(f"{folder} has no *.jpg")
     with ProcessPoolExecutor() as pool:
         samples = list(pool.map(samples_of, range(len(names)), names, chunksize=8))
-    part = WEIGHTS.with_suffix(".part.npy")
-    np.save(part, whole(trained([sample for each in samples for sample in each])))
-    part.replace(WEIGHTS)
+    weights = whole(trained([sample for each in samples for sample in each]))
+    with atomic_path(WEIGHTS) as part, open(part, "wb") as file:
+        np.save(file, weights)
 
 
 def samples_of(seed: int, name: Path) -> list[Sample]:

@@ -139,7 +139,7 @@ class Field:
         return loop_filter.COMMON if self.header.limited else loop_filter.OWN
 
     def guess(self, node: Node, job: Job) -> NDArray[np.int32]:
-        """What the first plane of a decoded view lacks, as `learnt` guesses it, in the first levels; else nothing."""
+        """Twice what a decoded view's first plane lacks, in samples, by `learnt`; nothing beyond the first levels."""
         if not self.header.learnt or node.level >= LEARNT_LEVELS:
             return NO_GUESS
         memory = learnt.memory(*self.shape)

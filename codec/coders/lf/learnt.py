@@ -3,7 +3,7 @@
 Its inputs are the differences of a sample from those around it, each limited, in parts of the quantiser's step, and
 whether the sample lies at the border of a block, and in a block with a residual. Layers of rectified sums follow. The
 `loop_filter` weighs the result by a tap. All numbers are integers below 2^24, which float32 holds exactly, so that
-sums have no order.
+sums have no order. (Networks as filters of decoded pictures: Dai, Liu and Wu 2017.)
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Net(NamedTuple):
 
     first: Any  # (INPUTS / 9, CHANNELS, 9)
     between: Any  # (LAYERS, CHANNELS before, CHANNELS, 9)
-    last: Any  # (CHANNELS, 4, 9), of which the first of four counts
+    last: Any  # (CHANNELS, 4, 9): `_add_nine` makes four sums, of which the first counts
     biases: Any  # (LAYERS + 1, CHANNELS), in 2^-14
 
 

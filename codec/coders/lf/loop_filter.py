@@ -119,7 +119,7 @@ def _code_taps(coder, taps, plane, count, length):
 def find_differences(planes, p, y, limit, guess, found):
     """found[:TAPS, :W] = differences of a row's samples from their neighbours; planes are (3, H + 4, W + 4).
 
-    ``guess`` (H, W) is what the first plane lacks; without rows it is 0.
+    ``guess`` (H, W) is twice what the first plane lacks; without rows it is 0.
     """
     plane = planes[p]
     outer, above, row, below, last = plane[y], plane[y + 1], plane[y + 2], plane[y + 3], plane[y + 4]
@@ -144,10 +144,10 @@ def find_differences(planes, p, y, limit, guess, found):
     if p == 0 and len(guess):
         row = guess[y]
         for i in range(found.shape[1]):
-            found[14, np.uint64(i)] = row[np.uint64(i)]
+            found[COMMON, np.uint64(i)] = row[np.uint64(i)]
     else:
         for i in range(found.shape[1]):
-            found[14, np.uint64(i)] = 0
+            found[COMMON, np.uint64(i)] = 0
 
 
 @lane_stage
@@ -261,7 +261,7 @@ def filter_view(views, view, filters, limit, guess, planes, activity, classes, b
     limit : int32
         Of limited differences; with 0 they are 0.
     guess : ndarray of int32, (H, W) or (0, 0)
-        What the first plane lacks, by `learnt`.
+        Twice what the first plane lacks, by `learnt`.
     planes : ndarray of int16, (3, H + 4, W + 4)
         Memory, as all that follows.
     activity : ndarray of int32, (2, H + 4, W + 4)
