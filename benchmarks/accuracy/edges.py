@@ -23,8 +23,8 @@ from ii_core import IICamera, preset
 from ii_core.base.colour import srgb
 from ii_core.display.figure import new_figure
 from raytrace_ii import Scene, load_scene, render, trace
-from raytrace_ii.tracing import edges
-from raytrace_ii.tracing.kernels.cells import CUT, DONE, OPEN
+from raytrace_ii.sampling import edges
+from raytrace_ii.sampling.cell_kernels import CUT, DONE, OPEN
 
 RECORDS, PAGE = Records("edges", ("benchmarks.accuracy.edges",)), "docs/speed_accuracy.md"
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")

@@ -1,4 +1,4 @@
-"""Places of a pixel's samples: the sets of `raytrace_ii.tracing.sample_places`, and what they miss of an edge.
+"""Places of a pixel's samples: the sets of `raytrace_ii.sampling.sample_places`, and what they miss of an edge.
 
     python -m benchmarks run sample_places [--find]
 
@@ -21,8 +21,8 @@ from scipy.optimize import minimize
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin, table
-from raytrace_ii.tracing.kernels.sampling import places
-from raytrace_ii.tracing.sample_places import MOST, doubling_places, fixed_places
+from raytrace_ii.sampling.sample_kernels import places
+from raytrace_ii.sampling.sample_places import MOST, doubling_places, fixed_places
 
 RECORDS = Records("sample_places", ("benchmarks.accuracy.sample_places",))
 PAGE = "docs/speed_accuracy.md"

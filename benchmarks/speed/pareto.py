@@ -30,8 +30,8 @@ from benchmarks.speed.tessellation import scene_text, sizes
 from ii_core import IICamera, preset
 from ii_core.display.figure import COLOURS, new_figure
 from raytrace_ii import load_scene
+from raytrace_ii.sampling.samples import EDGES
 from raytrace_ii.tracing.packing import packed
-from raytrace_ii.tracing.sampling import EDGES
 
 MODULES = tuple(f"benchmarks.speed.{name}" for name in ("pareto", "shots", "before", "tessellation"))
 RECORDS, SCALE = Records("pareto", MODULES), 32  # scale on the page

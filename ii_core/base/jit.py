@@ -11,7 +11,7 @@ import contextlib
 import gc
 import hashlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -337,3 +337,30 @@ def address(compiled: Any, arguments: tuple[Any, ...]) -> int:
 def _keep(compiled: Any, result: Any) -> None:
     """Keep a compiled kernel that Python cannot call: numba's own way would have calls go to its wrapper."""
     compiled.overloads[tuple(result.signature.args)] = result
+
+
+class _First(event.Listener):
+    """Listener for the first compilation."""
+
+    def __init__(self, tell: Callable[[bool], None]) -> None:
+        self.tell: Callable[[bool], None] | None = tell
+
+    def on_start(self, event: Any) -> None:
+        """Tell, once; numba has not found the kernel on the disk."""
+        tell, self.tell = self.tell, None
+        if tell is not None:
+            tell(isinstance(event.data["dispatcher"]._cache, FunctionCache))
+
+    def on_end(self, event: Any) -> None:
+        """Do nothing."""
+
+
+@contextlib.contextmanager
+def compilation_told(tell: Callable[[bool], None]) -> Iterator[None]:
+    """Call ``tell(kept)`` when the block compiles its first kernel; ``kept`` is whether the disk will hold it."""
+    listener = _First(tell)
+    event.register("numba:compile", listener)
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", listener)

@@ -58,7 +58,7 @@ class App(typer.Typer):
         def decorate(function: Callable[..., None]) -> Callable[..., None]:
             @wraps(function)
             def run(*arguments: Any, quiet: bool, **more: Any) -> None:
-                from ii_core.base.compilation import compilation_told
+                from ii_core.base.jit import compilation_told
 
                 running.quiet, running.started, running.cpu = quiet, time.perf_counter(), cpu_seconds()
                 try:

@@ -17,18 +17,11 @@ from numpy.typing import NDArray
 from ii_core import Camera, IICamera, MapCamera
 from ii_core.base.colour import srgb
 
-from ..scene.scene import Scene
-from ..tracing.coverage import covered
-from ..tracing.edges import RECORDED, Sight, dense_mean, edge_mean, small_rods
-from ..tracing.kernels.arrays import Start
-from ..tracing.kernels.sampling import lobe_keys
-from ..tracing.kernels.srgb import encode_srgb, encode_steps
-from ..tracing.packing import packed, share
-from ..tracing.raster import Raster, Views, parallel_views
-from ..tracing.sample_places import MOST
-from ..tracing.sampling import (
+from ..sampling.coverage import covered
+from ..sampling.edges import RECORDED, Sight, dense_mean, edge_mean, small_rods
+from ..sampling.sample_places import MOST
+from ..sampling.samples import (
     Adaptive,
-    CameraRays,
     Edges,
     EvenRays,
     Sampling,
@@ -37,7 +30,13 @@ from ..tracing.sampling import (
     fixed_sum,
     number_of_samples,
 )
-from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer, start_tables
+from ..scene.scene import Scene
+from ..tracing.kernels.arrays import Start
+from ..tracing.kernels.glossy import lobe_keys
+from ..tracing.kernels.srgb import encode_srgb, encode_steps
+from ..tracing.packing import packed, share
+from ..tracing.raster import Raster, Views, parallel_views
+from ..tracing.tracer import LOBE_RAYS, CameraRays, RayCount, Support, Tracer, start_tables
 from .audit import FULL_DEPTH, FULL_SAMPLES, Audit, chosen, compared
 from .nearness import parts_of_pixel, pixels_are_nearer, steps_at_content
 from .tiles import Order, Tile, ray_order, strips, tiles

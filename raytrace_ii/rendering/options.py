@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ii_core.base.executors import check_executor
 
-from ..tracing.sampling import sampling
+from ..sampling.samples import sampling
 from .job import CURVES
 
 MOST_WORKERS = 1024

@@ -22,8 +22,8 @@ from ii_core.picture.notebook import captioned, front_png
 from ii_core.picture.picture import picture_rows, sidecar
 from ii_core.picture.sensor_noise import NOISE_ROWS, noisy_rows
 
+from ..sampling.samples import of_camera, sampling
 from ..scene.scene import Scene
-from ..tracing.sampling import of_camera, sampling
 from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES, UNITS, coverage_header
 from ..tracing.tracer import RayCount, check_scene, rigid
 from .audit import Audit

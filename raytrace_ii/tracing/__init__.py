@@ -1,1 +1,1 @@
-"""Ray tracing: intersection, packed scene, shading, sampling."""
+"""Ray tracing: intersection, packed scene, shading."""

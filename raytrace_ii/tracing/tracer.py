@@ -21,9 +21,9 @@ from .kernels.appearance import attenuate, look_closely, paint
 from .kernels.arrays import Generation, Onward, Passage, Rays, Recorded, ShadowRays, Stages, Start
 from .kernels.attributes import footprints
 from .kernels.clear import pass_clear_face, pass_faces, start_inside, tell_inside
+from .kernels.glossy import lobe_keys
 from .kernels.lanes import PACKET, aligned, work
 from .kernels.light import add_unblocked, keep_unblocked
-from .kernels.sampling import lobe_keys
 from .kernels.sky import add_sky_image
 from .kernels.spawn import reflect
 from .kernels.spawn import spawn as spawn_rays
@@ -42,9 +42,9 @@ from .kernels.tables import (
 )  # fmt: skip
 from .kernels.way import record, way_kernel
 from .packing import PackedScene, packed
-from .sampling import CameraRays
 from .support_images import RECORDED
 
+CameraRays = Start | tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]  # L, D, shares
 KINDS = ("primary", "shadow", "reflection", "refraction")
 _NO_ROWS = np.empty(0, np.int32)
 _NO_HITS = Hits(_NO_ROWS, *(np.empty(0, np.float32) for _ in range(3)))  # the kernel finds them

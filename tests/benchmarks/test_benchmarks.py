@@ -132,7 +132,7 @@ def test_code_is_the_same_without_words_and_imports():
 
 def test_a_benchmark_needs_what_its_names_come_from():
     names = {str(path.relative_to(age.ROOT)) for path in age.imported("benchmarks.accuracy.sample_places")}
-    assert "raytrace_ii/tracing/sample_places.py" in names
+    assert "raytrace_ii/sampling/sample_places.py" in names
     assert not any(name.startswith(("codec/", "ii_core/calibration/", "benchmarks/pages/")) for name in names)
     # a name of a package's front, and one imported inside a function
     assert age._home("ii_core", "view_image") == "ii_core.picture.view"

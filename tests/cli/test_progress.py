@@ -10,7 +10,7 @@ import pytest
 
 from codec import decode, encode
 from ii_core import preset
-from ii_core.base import compilation
+from ii_core.base import jit
 from raytrace_ii import load_scene, render
 from raytrace_ii.cli import app, progress
 from raytrace_ii.cli.progress import console
@@ -130,11 +130,11 @@ def test_compilation_is_reported_once_and_only_with_a_cold_cache(tmp_path):
         spec.loader.exec_module(module)
         return module.double
 
-    with compilation.compilation_told(told.append):
+    with jit.compilation_told(told.append):
         cold = fresh()
         assert (cold(2), cold(2.5)) == (4, 5.0)  # two compilations
     assert told == [True]
-    with compilation.compilation_told(told.append):
+    with jit.compilation_told(told.append):
         assert fresh()(2) == 4  # from the disk, as in a second process
     assert told == [True]
 

@@ -28,7 +28,7 @@ class Rays(NamedTuple):
     """One generation of rays.
 
     ``inside`` (n, nested) lists the transmissive bodies that a ray runs in, −1 after the last. ``keys`` are places in
-    the lobes of rough mirrors, as `sampling.lobe_keys` gives them, of no rows where nothing is rough; ``widths`` at
+    the lobes of rough mirrors, as `glossy.lobe_keys` gives them, of no rows where nothing is rough; ``widths`` at
     the origins, mm, of no rows for camera rays, or where images are not filtered.
     """
 

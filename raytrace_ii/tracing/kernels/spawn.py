@@ -10,9 +10,8 @@ from ii_core.base.jit import inline_kernel, late_kernel, part_kernel, stage_kern
 
 from . import lanes as at
 from .addresses import value_at
-from .glossy import glossy_direction
+from .glossy import LOW, R2_ACROSS, R2_AROUND, glossy_direction, mix_bits
 from .media import cross, disperses, fresnel, media_at, refractive_index
-from .sampling import LOW, R2_ACROSS, R2_AROUND, mix_bits
 from .tables import (
     ALPHA_BLEND,
     EXTRAS,

@@ -11,7 +11,7 @@ from ii_core import preset, read_maps, write_maps
 from metrics import q_global
 from raytrace_ii import Audit, render, render_to
 from raytrace_ii.rendering import audit, job
-from raytrace_ii.tracing.sampling import Adaptive
+from raytrace_ii.sampling.samples import Adaptive
 from tests.support.trace_scenes import hall
 
 CAMERA = preset("setup1", scale=128)  # 64×32 px, 4×2 lenses

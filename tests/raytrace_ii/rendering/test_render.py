@@ -13,9 +13,9 @@ from ii_core.picture.view import view_positions
 from raytrace_ii import Audit, Background, Scene, load_scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.rendering.tiles import ray_order, tiles
-from raytrace_ii.tracing.kernels.sampling import places as sample_places
+from raytrace_ii.sampling.sample_kernels import places as sample_places
+from raytrace_ii.sampling.sample_places import fixed_places
 from raytrace_ii.tracing.kernels.srgb import encode_srgb
-from raytrace_ii.tracing.sample_places import fixed_places
 from raytrace_ii.tracing.support_images import SUPPORT, SUPPORT_IMAGES
 from tests.support.trace_scenes import UNIFORM, WHITE, body, box, floor, hall, lamp, sphere, sun, wall
 

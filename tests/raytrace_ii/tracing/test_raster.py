@@ -7,11 +7,11 @@ from ii_core import IICamera, preset
 from ii_core.camera import optics
 from raytrace_ii import load_scene, render
 from raytrace_ii.rendering import job
+from raytrace_ii.sampling.samples import EvenRays
 from raytrace_ii.tracing import raster
 from raytrace_ii.tracing.intersect import first_of_same
 from raytrace_ii.tracing.kernels import raster as kernels
 from raytrace_ii.tracing.raster import Raster, parallel_views
-from raytrace_ii.tracing.sampling import EvenRays
 from raytrace_ii.tracing.tracer import start_tables
 from tests.support.slow import first_fast
 from tests.support.trace_scenes import hall, on_planes, sphere

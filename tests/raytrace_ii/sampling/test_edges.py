@@ -14,9 +14,9 @@ from ii_core.base.colour import srgb
 from raytrace_ii import Light, Scene, load_scene, render
 from raytrace_ii.rendering import job
 from raytrace_ii.rendering.render import render_to
+from raytrace_ii.sampling.edges import SETS
 from raytrace_ii.scene.textures import Checker
 from raytrace_ii.shapes.primitives import Mesh
-from raytrace_ii.tracing.edges import SETS
 from raytrace_ii.tracing.support_images import name_hashes
 from tests.support.trace_scenes import BLACK, WHITE, body, hall, wall
 

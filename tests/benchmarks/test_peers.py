@@ -1,4 +1,4 @@
-"""Script for JPEG Pleno's 4-D transform mode: commands, order of views, missing programs, best setting."""
+"""Comparisons with programs of others: commands, what both sides get, what is said without them."""
 
 import os
 import shlex
@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks.coding import jplm
-from ii_core import IIPicture
+from benchmarks.speed import mitsuba
+from ii_core import IIPicture, preset
+from raytrace_ii import load_scene, render
 
 # An encoder that stores the views as they are, with its words, and a decoder that writes them.
 PROGRAM = """#!{python} -IS
@@ -80,3 +82,36 @@ def test_the_best_setting_has_the_least_rate(factor, expected):
     curve = [{"bpp": 0.1 * 2**n, "psnr": 30 + 3.0 * n} for n in range(5)]
     other = [{**point, "bpp": factor * point["bpp"]} for point in curve]
     assert jplm.best({"whole": curve, "split": other}) == expected
+
+
+def test_without_mitsuba_one_line_says_what_to_install(monkeypatch):
+    def missing(name):
+        raise ImportError(name)
+
+    monkeypatch.setattr(mitsuba, "import_module", missing)
+    monkeypatch.setattr("sys.argv", ["mitsuba"])
+    with pytest.raises(SystemExit, match=r"^Mitsuba is missing: `pip install .*` and PYTHONPATH=FOLDER, .*LLVM.*$"):
+        mitsuba.main()
+
+
+def test_plain_scenes_have_one_light_and_one_grey_and_all_faces():
+    scene = load_scene("cuboid")
+    plain = mitsuba.plain(scene)
+    assert len(plain.lights) == 1 < len(scene.lights)
+    assert all(body.material.texture is None for body in plain.bodies)
+    assert sum(len(b.faces) for b in plain.bodies) == sum(len(b.faces) for b in scene.bodies)
+    picture = render(plain, preset("setup1", scale=128), dtype="float32", support=()).picture.pixels
+    assert 0 < picture.max() and (picture == 0).any(), "light and black shadows"
+    brightest = max(plain.lights[0].colour) * mitsuba.GREY
+    assert picture.max() <= brightest * (1 + 1e-5), "no highlights"
+
+
+def test_mitsuba_sees_the_same():
+    """One pixel in two hundred may differ by a hundredth of white: edges, and shadows at the terminator."""
+    installed = pytest.importorskip("mitsuba")
+    installed.set_variant("llvm_ad_mono")
+    camera = preset("setup1", scale=64)
+    scene = mitsuba.plain(load_scene("apples"))
+    theirs = mitsuba.prepared(installed, scene, camera)()
+    ours = render(scene, camera, dtype="float32", support=()).picture.pixels[..., 0]
+    assert (abs(theirs - ours) > mitsuba.SAME).mean() < 0.005

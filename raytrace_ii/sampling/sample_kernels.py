@@ -1,7 +1,4 @@
-"""Adaptive supersampling: keys, sample positions, sums and standard errors.
-
-A key of a pixel or lobe, a hash of 64 bits, holds a place in [0, 1)², two fractions of 2³².
-"""
+"""Supersampling: places of samples, sums and standard errors."""
 
 from __future__ import annotations
 
@@ -11,19 +8,7 @@ import numpy as np
 
 from ii_core.base.jit import inline_kernel, kernel
 
-# numba makes 64 bits of a sum of two 32-bit numbers: fractions of 32 bits stand in 64-bit words, cut by `LOW`.
-LOW = np.uint64(0xFFFFFFFF)
-# 1/g and 1/g² of g³ = g + 1 as fractions of 2³² (Roberts 2018).
-R2_ACROSS, R2_AROUND = np.uint64(3242174889), np.uint64(2447445414)
-
-
-@inline_kernel
-def mix_bits(h):
-    """splitmix64's finaliser (Steele, Lea, Flood 2014)."""
-    h = h + np.uint64(0x9E3779B97F4A7C15)
-    h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    h = (h ^ (h >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return h ^ (h >> np.uint64(31))
+from ..tracing.kernels.glossy import LOW, mix_bits
 
 
 @kernel
@@ -98,23 +83,6 @@ def near_together(m, n, places, parts, pixels, traced, columns, rows, within):
 @inline_kernel
 def _part(places, i, j, parts):
     return int(places[i, j, 1] * parts) * parts + int(places[i, j, 0] * parts)
-
-
-@kernel
-def lobe_keys(seed, m, n, columns, first, count, out):
-    """Keys of places in [0, 1)² in the lobes of rough mirrors, as rows of ``out``: samples of pixels (m, n).
-
-    Each 32 bits are a fraction. The samples of a pixel follow the R2 sequence (Roberts 2018), which spreads any
-    number of places evenly, from a start by a hash of seed and pixel.
-    """
-    for i in range(m.shape[0]):
-        pixel = np.uint64(n[i]) * np.uint64(columns) + np.uint64(m[i])
-        own = mix_bits(mix_bits(np.uint64(seed) ^ mix_bits(pixel)) + np.uint64(2))
-        for j in range(count):
-            step = np.uint64(first + j)
-            across = ((own & LOW) + step * R2_ACROSS) & LOW
-            around = ((own >> np.uint64(32)) + step * R2_AROUND) & LOW
-            out[i * count + j] = (around << np.uint64(32)) | across
 
 
 @kernel

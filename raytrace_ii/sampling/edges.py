@@ -1,7 +1,7 @@
 """Samples where the edges are: one through the centre of each pixel, more where the picture has a step.
 
 A pixel whose neighbours under the same lens look alike has the light of its centre. Any other one is a cell between
-corners that neighbours share, see `kernels.cells`. If corners and centre agree, it has their mean; an edge between
+corners that neighbours share, see `cell_kernels`. If corners and centre agree, it has their mean; an edge between
 two groups of them is found by bisection, mostly by visibility alone, and checked on both sides. What is neither gets
 a set of samples. Small and thin bodies, which all of these may miss, have sets of their own in the strip of the pixel
 in which they are seen. A tile of fine structure, which a sixteenth of its pixels tell, gets sets in all its pixels.
@@ -24,14 +24,15 @@ from numpy.typing import NDArray
 from ii_core import IICamera
 
 from ..scene.scene import Scene
-from .kernels import cells as kernels
-from .kernels.cells import CUT, DONE, MISSED, OPEN, UNITS, Places, Points, Sides
-from .kernels.sampling import lobe_keys
-from .kernels.sampling import places as set_places
-from .packing import packed
+from ..tracing.kernels.glossy import lobe_keys
+from ..tracing.packing import packed
+from ..tracing.tracer import LOBE_RAYS, Support, Tracer
+from . import cell_kernels as kernels
+from . import rod_kernels
+from .cell_kernels import CUT, DONE, MISSED, OPEN, UNITS, Places, Points, Sides
+from .sample_kernels import places as set_places
 from .sample_places import fixed_places
-from .sampling import Edges, EvenRays, Parts, Shoot, camera_rays, fixed_sum, needed, with_rim
-from .tracer import LOBE_RAYS, Support, Tracer
+from .samples import Edges, EvenRays, Parts, Shoot, camera_rays, fixed_sum, needed, with_rim
 
 ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
 # Numbers of samples of pixels that are no cells. Others above 16 miss more of an edge than these in turn.
@@ -90,7 +91,7 @@ class Sight:
 class Cells:
     """Pixels of a tile and its rim in rows: columns and rows in the picture, lenses, and what is seen of them.
 
-    ``verdicts`` are those of `kernels.cells`, −1 for pixels that are no cells.
+    ``verdicts`` are those of `cell_kernels`, −1 for pixels that are no cells.
     """
 
     sight: Sight
@@ -202,13 +203,13 @@ class Cells:
         return pixels
 
     def _touched(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
-        """Return which pixels small bodies may be seen in, and strips (n, 6) that have them, see `kernels.strips`."""
+        """Return which pixels small bodies may be seen in, and strips (n, 6) of them, see `rod_kernels.strips`."""
         one = np.empty(len(pixels), np.int32)
-        kernels.touched(*self._unit_rays(pixels), self.sight.rods, *self.sight.pixel, one)
+        rod_kernels.touched(*self._unit_rays(pixels), self.sight.rods, *self.sight.pixel, one)
         which = np.flatnonzero(one != -1)
         one, (L, D) = one[which], self._unit_rays(pixels[which])
         right, down = (2 * (self._unit_rays(pixels[which], *at)[1] - D) for at in ((1.0, 0.5), (0.5, 1.0)))
-        kernels.strips(L, D, right, down, self.sight.rods, one, strip := np.empty((len(which), 6)))
+        rod_kernels.strips(L, D, right, down, self.sight.rods, one, strip := np.empty((len(which), 6)))
         seen = strip[:, 5] != 0
         return which[seen], strip[seen]
 
@@ -231,10 +232,10 @@ class Cells:
             twice = np.tile(set_of.reshape(-1, number, 2), (1, 2, 1))
             # a body stands in its strip in the same place in all pixels
             twice[:, :number] = (twice[:, :number] + np.outer(m + 1.6 * n, SHIFTS)[:, None]) % 1.0
-            kernels.strip_places(strip[some], twice, shares := np.empty(twice.shape[:2]))
+            rod_kernels.strip_places(strip[some], twice, shares := np.empty(twice.shape[:2]))
             rays = camera_rays(s.rays, np.repeat(m, count), np.repeat(n, count), twice.reshape(-1, 2))
             light = s.shoot(rays, numbers=(m, n, 0, count), first=None, traced=np.empty(0, np.int32))
-            kernels.add_shares(light, shares, pixels[some], self.sums)
+            rod_kernels.add_shares(light, shares, pixels[some], self.sums)
 
     def _near_together(self, pixels: NDArray[np.int64], near: NDArray[np.float32]) -> NDArray[np.int64]:
         """Return pixels in an order in which the edges that they see are close to each other in the scene.

@@ -1,7 +1,7 @@
 """Supersampling: positions and number of the samples of a pixel.
 
 Up to 16 samples of a pixel stand where `sample_places` puts them, more are the first of a (0, 2)-sequence, see
-`kernels.sampling.places`. Their number is fixed, or adaptive: it starts with the least, then doubles, pixel by pixel,
+`sample_kernels.places`. Their number is fixed, or adaptive: it starts with the least, then doubles, pixel by pixel,
 until the estimated standard error of the pixel is within a target or the most is reached. The estimate is
 
     error² = Σ(qᵢ − x̄)² / 12 + d² / n³
@@ -32,15 +32,15 @@ from numpy.typing import NDArray
 
 from ii_core import IICamera
 
-from .kernels import sampling as sample_kernels
-from .kernels.arrays import Start
+from ..tracing.kernels.arrays import Start
+from ..tracing.tracer import CameraRays
+from . import sample_kernels
 from .sample_places import doubling_places, fixed_places
 
 MOST_SAMPLES = 1 << 16
 
 Floats = NDArray[np.float64]
 Radiance = NDArray[np.float32]
-CameraRays = Start | tuple[Floats, Floats, Floats | None]  # by columns and rows, or L, D and shares of light
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ from ii_core import IICamera, preset
 from ii_core.camera import optics
 from raytrace_ii import Scene, render, trace
 from raytrace_ii.rendering import job
+from raytrace_ii.sampling import sample_kernels
+from raytrace_ii.sampling.sample_places import MOST, doubling_places, fixed_places
+from raytrace_ii.sampling.samples import EvenRays, camera_rays
 from raytrace_ii.scene.textures import Checker, Noise
-from raytrace_ii.tracing.kernels import sampling as sample_kernels
 from raytrace_ii.tracing.kernels.lanes import work
 from raytrace_ii.tracing.kernels.start import start_separable_rays
-from raytrace_ii.tracing.sample_places import MOST, doubling_places, fixed_places
-from raytrace_ii.tracing.sampling import EvenRays, camera_rays
 from raytrace_ii.tracing.tracer import start_tables
 from tests.support.slow import first_fast
 from tests.support.trace_scenes import BLACK, UNIFORM, WHITE, body, hall, sphere, wall
@@ -141,7 +141,7 @@ def test_edges_of_a_picture_have_less_error_than_by_the_sequence(monkeypatch):
 
     table = error(16), error((4, 16), error=0.1)
     for name in ("fixed_places", "doubling_places"):
-        monkeypatch.setattr(f"raytrace_ii.tracing.sampling.{name}", lambda samples: NO_TABLE)
+        monkeypatch.setattr(f"raytrace_ii.sampling.samples.{name}", lambda samples: NO_TABLE)
     assert table[0] < 0.9 * error(16)
     assert table[1] < error((4, 16), error=0.1)
 

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tracing.support_images import NAMES, name_hashes
+from ..tracing.tracer import CameraRays, Support
+from . import cell_kernels as kernels
+from .cell_kernels import CUT, OPEN, UNITS, Places, Points
 from .edges import Cells, Sight, _part, _places
-from .kernels import cells as kernels
-from .kernels.cells import CUT, OPEN, UNITS, Places, Points
-from .sampling import CameraRays, Edges, camera_rays, fixed_sum
-from .support_images import NAMES, name_hashes
-from .tracer import Support
+from .samples import Edges, camera_rays, fixed_sum
 
 SAMPLES = 64
 LIGHT = 1.0 / 65536  # between the bodies

@@ -1,0 +1,1 @@
+"""Sampling of pixels: places of samples, their number, and cells cut by edges."""
