@@ -31,7 +31,7 @@ from . import (
 )
 from .blocks import code_blend, code_view
 from .contexts import Contexts
-from .field import Field
+from .field import NO_GUESS, Field
 from .pyramid import Node, Place, pyramid
 from .search import Search
 from .state import MOST_REFERENCES, Job, Work, new_work, zeros
@@ -50,7 +50,7 @@ GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below whic
 GOOD_SAMPLES = 128 * 64
 SURELY = 5.0, 5.0, 2.0  # times GOOD: intra modes are not tried below it
 # intra modes of the first view that are compared by coefficients and coded on trial, by effort
-FIRST_ESTIMATES, FIRST_TRIES = (0, 8, 20), (1, 3, 8)
+FIRST_ESTIMATES, FIRST_TRIES = (0, 12, 20), (1, 4, 8)
 HALVINGS = 0, 1, 2  # of squares of blocks; one more of the first view by `best`
 BLEND_ROWS = 4, 4, 1  # the kind of blending is chosen by every so many-th row
 WEIGHT = 0.12  # squared error a bit is worth, in squared steps
@@ -341,7 +341,7 @@ class Source:
         trial = self.field(header)
         # All with the step of most views, by which errors are those of most views.
         step = header.steps[max(i for i, level in enumerate(trial.levels) if level)]
-        trial.header = replace(header, steps=(step,) * len(header.steps))
+        trial.header = replace(header, steps=(step,) * len(header.steps), learnt=False)  # that takes time
         trial.levels = trial.levels[:TRIAL_LEVELS]
         effort, self.effort = self.effort, 0
         self.levels(trial, Contexts(trial.header.refined))
@@ -403,7 +403,8 @@ class Source:
                     del job, jobs, made
                     for first in range(0, len(nodes), some):
                         part = batch[first : first + some]
-                        jobs, made, filters = zip(*workers.map(partial(self._found, field, costs), part), strict=True)
+                        found = workers.map(partial(self._found, field, costs), part)
+                        jobs, made, filters, guesses = zip(*found, strict=True)
                         for job, filtering in zip(jobs, filters, strict=True):
                             coder = arithmetic.enlarged(coder, room)
                             same = 0
@@ -412,10 +413,10 @@ class Source:
                                     coder, field.filters, job.at, filtering, worth(job.step)
                                 )
                             field.code(coder, job, work, same)
-                        workers.map(field.refine, nodes[first : first + some], jobs, made)
+                        workers.map(field.refine, nodes[first : first + some], jobs, made, guesses)
                         if forgetful:
                             field.forget(nodes[first : first + some])
-                        del part, job, jobs, made  # before the next takes as much
+                        del part, found, job, jobs, made, guesses  # before the next takes as much
                     del batch
                     field.finish(nodes)
                 levels.append(arithmetic.finish(coder))
@@ -447,8 +448,8 @@ class Source:
 
     def _found(
         self, field: Field, costs: NDArray[np.float32], begun: tuple[Node, Job, synthesis.Synthesis, int]
-    ) -> tuple[Job, synthesis.Synthesis, loop_filter_search.Found | None]:
-        """A view's blocks, found and decoded; its synthesis, and its best filters."""
+    ) -> tuple[Job, synthesis.Synthesis, loop_filter_search.Found | None, NDArray[np.int32]]:
+        """A view's blocks, found and decoded; its synthesis, its best filters, and the guess that these weigh."""
         node, job, made, nearest = begun
         if not made.made.size:
             samples, levels = (zeros((3, *field.shape))[0] for _ in range(2))
@@ -457,12 +458,11 @@ class Source:
                 synthesis.blend(made, nearest, 1)
         original = self._target(field, node)
         search.find_blocks(costs, job, self._search(job, original))
-        filters = None
+        filters, guess = None, NO_GUESS
         if field.header.filtered:
-            limit = field.limit(job.step)
-            guess = field.guess(node, job)
+            limit, guess = field.limit(job.step), field.guess(node, job)
             filters = loop_filter_search.search_filters(field.views, job.at, original, limit, guess, worth(job.step))
-        return job, made, filters
+        return job, made, filters, guess
 
     def _target(self, field: Field, node: Node) -> NDArray[np.int16]:
         """Return the planes to be coded: those of the view, with less noise where it predicts many others."""

@@ -161,11 +161,12 @@ class Field:
         for row, col in places:
             pixels[row::rows, col::cols] = self.view_pixels(self.number((row, col)))
 
-    def refine(self, node: Node, job: Job, made: Synthesis) -> None:
-        """Filter a decoded view, and note its disparity, for those that follow."""
+    def refine(self, node: Node, job: Job, made: Synthesis, guess: NDArray[np.int32] | None = None) -> None:
+        """Filter a decoded view, and note its disparity, for those that follow; an encoder has a guess already."""
         if self.header.filtered and self.filters.modes[job.at].any():
-            wanted = self.filters.modes[job.at, 0] and self.filters.taps[job.at, 0, :, loop_filter.COMMON].any()
-            guess = self.guess(node, job) if wanted else NO_GUESS
+            if guess is None:
+                wanted = self.filters.modes[job.at, 0] and self.filters.taps[job.at, 0, :, loop_filter.COMMON].any()
+                guess = self.guess(node, job) if wanted else NO_GUESS
             limit, memory = self.limit(job.step), loop_filter.memory(*self.shape)
             loop_filter.filter_view(self.views, job.at, self.filters, limit, guess, *memory)
         if (node.row, node.col) not in self.used or not (len(made.sources) or self.past):

@@ -7,6 +7,8 @@ Cauchy's function.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +20,8 @@ from .stream import UPRIGHT
 
 # Turns with views that are smoothed so many times by (1, 2, 1) / 4 across and down.
 TURNS, SMOOTHINGS = 4, (6, 2, 1)
-SAMPLES, MOST_APART = 1 << 23, 4  # of all views that are compared, about: of every so many-th row and column, at most
+SMOOTH = 2  # times from which on every second row and column tell as much as all
+SAMPLES, MOST_APART = 1 << 21, 4  # of all views that are compared, about: of every so many-th row and column, at most
 OUTLYING, LEAST_OUTLYING = 1.5, 4.0  # times the median of differences, and added: a difference with half the weight
 MOST_MOVE = 48 / 256  # of a cell's disparity in a turn, in samples
 # Of an entry and of disparity, the part of their curvature by which steps are damped.
@@ -27,7 +30,8 @@ DAMPING, DAMPING_OF_CELLS = 1e-3, 0.02
 # there were so much disparity more, in squared samples.
 HELD = 0.02
 OVERLAPPING = 0.25  # of a view's shorter side: disparity from the middle to the outermost view must not lead farther
-WORTH = 0.93  # a table is written if differences fall to this part
+# A table is written if differences fall to this part, and not looked for further if smoothed views stay above that.
+WORTH, HOPELESS = 0.93, 0.975
 _UNITS = np.array([PLACE_UNIT / UPRIGHT] * 2 + [SHIFT_UNIT / 256] * 6)
 
 
@@ -51,9 +55,35 @@ def departures(
     if reach < FAR or max(grid) // 2 * reach > OVERLAPPING * 256 * min(view(0, 0).shape[1:]):
         return None
     registration = _Registration(view, grid, lattice, limits)
-    before = registration.without_entries()
-    entries = registration.entries_found()
-    return entries if entries.any() and registration.misfit(entries) < WORTH * before else None
+    none = np.zeros((grid[0] * grid[1], FIELDS))
+    alone, moved = (_Fit(registration.start, none.copy(), moving) for moving in (False, True))
+    for count in SMOOTHINGS:
+        registration.smooth(count)
+        registration.improve(alone)
+        registration.improve(moved)
+        before, entries = registration.misfit(alone, alone), moved.whole()
+        after = registration.misfit(replace(moved, entries=entries * _UNITS), alone)
+        if not entries.any() or after > HOPELESS * before:
+            return None
+    return entries if after < WORTH * before else None
+
+
+@dataclass
+class _Fit:
+    """Disparity of cells and entries of views, which are 0 unless they are ``moving``."""
+
+    disparity: NDArray[np.float64]
+    entries: NDArray[np.float64]
+    moving: bool
+    scales: NDArray[np.float64] = field(init=False)  # of views: differences that have half the weight
+
+    def __post_init__(self) -> None:
+        self.scales = np.ones(len(self.entries))
+
+    def whole(self) -> NDArray[np.int64]:
+        """Return the entries in whole units."""
+        found: NDArray[np.int64] = np.rint(self.entries / _UNITS).astype(np.int64)
+        return np.clip(found, -MOST, MOST)
 
 
 class _Registration:
@@ -69,72 +99,61 @@ class _Registration:
         first, last = limits[0] // UNIT, -(-limits[1] // UNIT)
         errors = over_squares(cell_errors(view, grid, places[self.middle], lattice, (first, last)))
         self.start = (first + errors.argmin(axis=0)) * (UNIT / 256)
-        self.disparity = self.start
-        self.every = min(max(1, round((self.luma.size / SAMPLES) ** 0.5)), MOST_APART)
-        self.entries = np.zeros((len(places), FIELDS))
-        self.scales = self.limits = np.ones(len(places))  # differences with half the weight, and three times these
+        self.apart = min(max(1, round((self.luma.size / SAMPLES) ** 0.5)), MOST_APART)
+        self.every = self.apart
 
-    def without_entries(self) -> float:
-        """Improve disparity alone; return the misfit."""
-        self._improve(False)
-        self.limits = 3 * self.scales
-        return self.misfit(np.zeros(self.entries.shape, np.int64))
+    def smooth(self, count: int) -> None:
+        """Smooth the views so many times, and choose how many rows and columns are compared."""
+        self.every = max(2, self.apart) if count >= SMOOTH else self.apart
+        for at, luma in enumerate(self.luma):  # one by one: temporary arrays are as large as a view
+            self.views[at] = _smoothed(luma.astype(np.float32), count)
 
-    def entries_found(self) -> NDArray[np.int64]:
-        """Improve disparity, from the start, and entries; return these in whole units."""
-        self.disparity = self.start
-        self._improve(True)
-        found: NDArray[np.int64] = np.rint(self.entries / _UNITS).astype(np.int64)
-        return np.clip(found, -MOST, MOST)
-
-    def misfit(self, entries: NDArray[np.int64]) -> float:
-        """Return the sum of differences, which count up to their view's limit."""
+    def misfit(self, fit: _Fit, limiting: _Fit) -> float:
+        """Return the sum of differences, which count up to three times the scale of their view in another fit."""
         total = 0.0
         for at in self.others:
-            differences = self._register(at, entries[at] * _UNITS)[0]
-            total += float(np.minimum(np.abs(differences), self.limits[at]).sum())
+            differences = self._register(at, fit)[0]
+            total += float(np.minimum(np.abs(differences), 3 * limiting.scales[at]).sum())
         return total
 
-    def _improve(self, moving: bool) -> None:
-        for count in SMOOTHINGS:
-            for at, luma in enumerate(self.luma):  # one by one: temporary arrays are as large as a view
-                self.views[at] = _smoothed(luma.astype(np.float32), count)
-            for at in self.others:
-                differences = self._register(at, self.entries[at])[0]
-                self.scales[at] = OUTLYING * float(np.median(np.abs(differences))) + LEAST_OUTLYING
-            for _ in range(TURNS):
-                self._turn(moving)
-
-    def _turn(self, moving: bool) -> None:
-        """Take a step of the cells' disparity, and of the entries if these are moving."""
-        tops, bottoms = (np.zeros(self.disparity.shape) for _ in range(2))
+    def improve(self, fit: _Fit) -> None:
+        """Take some turns."""
         for at in self.others:
-            _, squares, side, top, bottom = self._register(at, self.entries[at])
+            differences = self._register(at, fit)[0]
+            fit.scales[at] = OUTLYING * float(np.median(np.abs(differences))) + LEAST_OUTLYING
+        for _ in range(TURNS):
+            self._turn(fit)
+
+    def _turn(self, fit: _Fit) -> None:
+        """Take a step of the cells' disparity, and of the entries if these are moving."""
+        tops, bottoms = (np.zeros(fit.disparity.shape) for _ in range(2))
+        for at in self.others:
+            _, squares, side, top, bottom = self._register(at, fit)
             tops, bottoms = tops + top, bottoms + bottom
-            if moving:
+            if fit.moving:
                 held = HELD * np.diag(squares)[2:4]
-                side[:2] -= held * self.entries[at, :2]
+                side[:2] -= held * fit.entries[at, :2]
                 squares += np.diag(DAMPING * np.diag(squares) + 1e-6)
                 squares[(0, 1), (0, 1)] += held
-                self.entries[at] += np.linalg.solve(squares, side)
+                fit.entries[at] += np.linalg.solve(squares, side)
         step = over_squares(tops[None])[0] / ((1 + DAMPING_OF_CELLS) * over_squares(bottoms[None])[0] + 1e-6)
-        self.disparity = self.disparity + np.clip(step, -MOST_MOVE, MOST_MOVE)
-        if moving:
-            self._settle()
+        fit.disparity = fit.disparity + np.clip(step, -MOST_MOVE, MOST_MOVE)
+        if fit.moving:
+            self._settle(fit)
 
-    def _settle(self) -> None:
+    def _settle(self, fit: _Fit) -> None:
         """Give to disparity what it can explain alone: a factor of it, a constant, and slopes across and down."""
         height, width = self.luma.shape[1:]
         rows, cols = ((8 * np.arange(side // 4) + 3 - side) / max(height, width) for side in (height, width))
-        for fields, by in (([0, 1], self.disparity), ([2, 3], 1.0), ([4, 6], cols), ([5, 7], rows[:, None])):
-            share = (self.leads * self.entries[:, fields]).sum() / (self.leads**2).sum()
-            self.entries[:, fields] -= share * self.leads
-            self.disparity = self.disparity + share * by
+        for fields, by in (([0, 1], fit.disparity), ([2, 3], 1.0), ([4, 6], cols), ([5, 7], rows[:, None])):
+            share = (self.leads * fit.entries[:, fields]).sum() / (self.leads**2).sum()
+            fit.entries[:, fields] -= share * self.leads
+            fit.disparity = fit.disparity + share * by
 
-    def _register(self, at: int, entry: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    def _register(self, at: int, fit: _Fit) -> tuple[NDArray[np.float64], ...]:
         middle, other, lead = self.views[self.middle], self.views[at], self.leads[at]
         found: tuple[NDArray[np.float64], ...] = _registered(
-            middle, other, self.disparity, lead, entry, self.every, self.scales[at]
+            middle, other, fit.disparity, lead, fit.entries[at], self.every, fit.scales[at]
         )
         return found
 
