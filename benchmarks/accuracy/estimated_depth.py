@@ -215,8 +215,9 @@ def of_twice_the_step(picture: IIPicture) -> np.ndarray:
 
 
 def psnr(error: np.ndarray) -> float:
-    """Return dB of an error in codes of 8 bit."""
-    return float(10 * np.log10(255**2 / np.mean(error**2)))
+    """Return dB of an error in codes of 8 bit: infinite without one, NaN of no pixels."""
+    with np.errstate(divide="ignore"):
+        return float(10 * np.log10(255**2 / np.mean(error**2))) if error.size else np.nan
 
 
 @lru_cache(maxsize=1)

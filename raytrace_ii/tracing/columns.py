@@ -55,8 +55,9 @@ def light_columns(
     """
     flat, count = corners.reshape(-1), len(corners)
     turns, known = np.zeros((len(lights), NUMBERS), np.float32), []
-    mates, seen = np.empty(3 * count, np.int32), np.empty((count, OF_FACE))
+    mates = np.empty(3 * count, np.int32)
     find_mates(flat, np.full(1 << (6 * count).bit_length(), -1, np.int32), mates)
+    seen = np.empty((count, OF_FACE))  # after that table is gone: it is as large
     for turn, lamp in zip(turns, lights[:MOST_LAMPS], strict=False):
         matrix = _matrix(lamp, corners, seen, size)
         own = np.full(size * size, np.nan, np.float32)
