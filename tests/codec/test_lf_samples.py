@@ -270,7 +270,7 @@ def test_colours_around_without_a_line_give_their_mean():
 
 @pytest.mark.slow
 def test_colours_that_follow_save_rate(monkeypatch):
-    """Texture whose colours are a line of its grey takes an eighth less than with factors of residuals alone."""
+    """Texture whose colours are a line of its grey takes a sixth less than with factors of residuals alone."""
     rng = np.random.default_rng(8)
     grey = np.kron(rng.uniform(40, 200, (24, 24)), np.ones((4, 4)))[..., None]
     pixels = np.clip(grey * [1.0, 0.7, 0.4] + [0, 20, 60], 0, 255).astype(np.uint8)
@@ -280,7 +280,7 @@ def test_colours_that_follow_save_rate(monkeypatch):
     quality = source.psnr(field)
     source.header = replace(source.header, guided=False)
     alone, field = source.coded(32 * lf.FRACTIONS)
-    assert len(followed) < 0.88 * len(alone) and quality > source.psnr(field) - 0.4
+    assert len(followed) < 0.85 * len(alone) and quality > source.psnr(field) - 0.4
     blocks = decoded_blocks(encode(picture, "si-lf", qp=32), monkeypatch)[0]
     assert blocks[FOLLOWS].mean() > 0.5
 

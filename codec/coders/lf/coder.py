@@ -341,7 +341,7 @@ class Source:
         trial = self.field(header)
         # All with the step of most views, by which errors are those of most views.
         step = header.steps[max(i for i, level in enumerate(trial.levels) if level)]
-        trial.header = replace(header, steps=(step,) * len(header.steps), learnt=False)  # that takes time
+        trial.header = replace(header, steps=(step,) * len(header.steps))
         trial.levels = trial.levels[:TRIAL_LEVELS]
         effort, self.effort = self.effort, 0
         self.levels(trial, Contexts(trial.header.refined))
