@@ -20,7 +20,8 @@ from .stream import UPRIGHT
 
 # Turns with views that are smoothed so many times by (1, 2, 1) / 4 across and down.
 TURNS, SMOOTHINGS = 4, (6, 2, 1)
-SMOOTH, LARGE = 2, 1 << 14  # times, and samples of a view, from which on every second row and column tell as much as all
+# Times, and samples of a view, from which on every second row and column tell as much as all.
+SMOOTH, LARGE = 2, 1 << 14
 SAMPLES, MOST_APART = 1 << 21, 4  # of all views that are compared, about: of every so many-th row and column, at most
 OUTLYING, LEAST_OUTLYING = 1.5, 4.0  # times the median of differences, and added: a difference with half the weight
 MOST_MOVE = 48 / 256  # of a cell's disparity in a turn, in samples
