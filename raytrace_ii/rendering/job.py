@@ -31,7 +31,7 @@ from ..sampling.samples import (
     number_of_samples,
 )
 from ..scene.scene import Scene
-from ..tracing.kernels.arrays import Start
+from ..tracing.kernels.arrays import Columns, Start
 from ..tracing.kernels.glossy import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
 from ..tracing.packing import packed, share
@@ -158,6 +158,7 @@ class Job:
         """Render one tile, and audit it."""
         started, audit, count, samples = time.thread_time(), None, RayCount(), Counter[int]()
         if self._views is not None:
+            self._columns()  # before lists of faces: making them takes as much memory for a moment
             self._local.strip = rows.start, self._strip(rows)
         images = {name: image[rows, cols] for name, image in self.images.items()}
         for down, right in [(rows, cols)] if self._views is None else self._parts_of((rows, cols)):
@@ -191,8 +192,7 @@ class Job:
     def _tile(self, rows: slice, cols: slice) -> Block:
         shape = rows.stop - rows.start, cols.stop - cols.start
         tracer = self._tracer(shape[0] * shape[1])
-        every = math.prod(self.camera.pixels) * number_of_samples(self.sampling)[0]
-        tracer.columns = packed(self.scene).columns(every)
+        tracer.columns = self._columns()
         order = ray_order(self.camera, rows, cols, self._by_lens())
         support = self._support_room(len(order.pixels))
         if isinstance(self.sampling, Adaptive | Edges):
@@ -257,6 +257,9 @@ class Job:
                 some = None if shares is None else shares[at]
                 tracer.run((L[at], D[at], some), radiance, None, self._keys(m, n, sample, 1))
         return encoded(radiance, np.arange(len(m), dtype=np.int32), self.sampling, self.dtype)
+
+    def _columns(self) -> Columns:
+        return packed(self.scene).columns(math.prod(self.camera.pixels) * number_of_samples(self.sampling)[0])
 
     def _tracer(self, rays: int = 0) -> Tracer:
         """Return this thread's own tracer, with counts reset, for so many rays at once: a large lens is one tile."""

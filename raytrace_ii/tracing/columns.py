@@ -15,8 +15,8 @@ from .kernels.columns import (
     TOLD,
     draw_rims,
     draw_sheets,
+    find_extents,
     find_mates,
-    project_faces,
     tell_columns,
 )
 from .kernels.tables import DIRECTIONAL
@@ -57,27 +57,27 @@ def light_columns(
     turns, known = np.zeros((len(lights), NUMBERS), np.float32), []
     mates = np.empty(3 * count, np.int32)
     find_mates(flat, np.full(1 << (6 * count).bit_length(), -1, np.int32), mates)
-    seen = np.empty((count, OF_FACE))  # after that table is gone: it is as large
+    work = np.empty((2, OF_FACE))
     for turn, lamp in zip(turns, lights[:MOST_LAMPS], strict=False):
-        matrix = _matrix(lamp, corners, seen, size)
+        found = _matrix(lamp, corners, size, work[0])
         own = np.full(size * size, np.nan, np.float32)
         known.append(own)
-        if matrix is None:
+        if found is None:
             continue
-        slack = ROUNDING * float(np.abs(seen[:, 6:]).max())
+        matrix, slack = found
         rims, layers = np.full(size * size, -np.inf, np.float32), np.zeros(size * size, np.uint8)
-        draw_rims(seen, normals, mates, size, rims)
+        draw_rims(matrix, flat, normals, mates, size, work, rims)
         sheets = np.full((size * size, OF_SHEET), -np.inf, np.float32)
-        draw_sheets(seen, size, slack, sheets, layers)
+        draw_sheets(matrix, flat, size, slack, work[0], sheets, layers)
         tell_columns(sheets, layers, rims, slack, own)
-        turn[MATRIX:SLACK], turn[SLACK], turn[TOLD] = matrix.reshape(-1), slack, 1
+        turn[MATRIX:SLACK], turn[SLACK], turn[TOLD] = matrix, slack, 1
     return Columns(turns.reshape(-1), np.concatenate(known), size, solid)
 
 
 def _matrix(
-    lamp: NDArray[np.float64], corners: NDArray[np.float32], seen: NDArray[np.float64], size: int
-) -> NDArray[np.float64] | None:
-    """Return the matrix (4, 4) from mm to u, v, weight and h, and fill ``seen``; None if a lamp has faces all around.
+    lamp: NDArray[np.float64], corners: NDArray[np.float32], size: int, work: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float] | None:
+    """Return the matrix (16,) from mm to u, v, weight and h, and the slack of h; None if a lamp has faces all around.
 
     The lattice encloses all faces but those that are as large as half of the scene.
     """
@@ -94,18 +94,14 @@ def _matrix(
     else:
         matrix[:3, :3], matrix[3, 3] = axes * [[1], [1], [-1]], 1
         matrix[:3, 3] = -matrix[:3, :3] @ place
-    project_faces(matrix.reshape(-1), corners.reshape(-1), seen)
+    flat, all_of_them, small = corners.reshape(-1), np.empty((3, 2)), np.empty((3, 2))
+    find_extents(matrix.reshape(-1), flat, np.full(3, np.inf), work, all_of_them)
+    find_extents(matrix.reshape(-1), flat, np.ptp(all_of_them, axis=1) / 2, work, small)
     for axis in (0, 1):
-        a, b, c = seen[:, 3 * axis : 3 * axis + 3].T
-        low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-        small = high - low < (high.max() - low.min()) / 2
-        if not small.any():
-            small[:] = True
-        start, end = low[small].min(), high[small].max()
+        start, end = (small if small[axis, 0] <= small[axis, 1] else all_of_them)[axis]
         scale = (size - 4) / max(end - start, np.finfo(np.float32).tiny)
         matrix[axis] = scale * (matrix[axis] - start * matrix[2]) + 2 * matrix[2]
-    project_faces(matrix.reshape(-1), corners.reshape(-1), seen)
-    return matrix
+    return matrix.reshape(-1), ROUNDING * float(np.abs(all_of_them[2]).max())
 
 
 def _from_faces(place: NDArray[np.float64], corners: NDArray[np.float32]) -> NDArray[np.float64] | None:

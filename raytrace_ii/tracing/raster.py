@@ -108,9 +108,21 @@ def _row(pose: Floats, axis: int, start: float, unit: float) -> Floats:
     return np.append(way, -(way @ pose[:3, 3]) - start) / unit
 
 
-def _pages(count: int) -> NDArray[np.uint32]:
+def _pages(count: int) -> mmap.mmap:
     """Return room for numbers that goes back to the system, not to the heap, when it is let go."""
-    return np.frombuffer(mmap.mmap(-1, 4 * max(count, 1)), np.uint32)
+    if hasattr(mmap, "MADV_DONTNEED"):
+        return mmap.mmap(-1, 4 * max(count, 1), flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    return mmap.mmap(-1, 4 * max(count, 1))
+
+
+def _moved(pages: mmap.mmap, start: int, end: int) -> NDArray[np.uint32]:
+    """Return numbers of the pages in pages of their own; those that held nothing else are given back at once."""
+    own = np.frombuffer(_pages(end - start), np.uint32)[: end - start]
+    own[:] = np.frombuffer(pages, np.uint32)[start:end]
+    first, last = -(-4 * start // mmap.PAGESIZE) * mmap.PAGESIZE, 4 * end // mmap.PAGESIZE * mmap.PAGESIZE
+    if hasattr(mmap, "MADV_DONTNEED") and last > first:
+        pages.madvise(mmap.MADV_DONTNEED, first, last - first)
+    return own
 
 
 class Raster:
@@ -160,13 +172,12 @@ class Raster:
             if group not in self._lists:
                 starts = np.append(0, np.cumsum(self._ends))
                 every = _pages(int(starts[-1]))
-                self._list(starts[:-1].copy(), every)
-                of_groups = starts[:: self._views_down]
+                self._list(starts[:-1].copy(), np.frombuffer(every, np.uint32))
+                of_groups = starts[:: self._views_down].tolist()
                 for i in range(self._groups):
-                    own = _pages(int(of_groups[i + 1] - of_groups[i]))
-                    own[: of_groups[i + 1] - of_groups[i]] = every[of_groups[i] : of_groups[i + 1]]
                     rows = min(self.views.lenses[1] - i * GROUP, GROUP)
-                    self._lists[i], self._unseen[i] = own, rows * self.planes
+                    self._lists[i] = _moved(every, of_groups[i], of_groups[i + 1])
+                    self._unseen[i] = rows * self.planes
             return self._lists[group]
 
     def _used(self, group: int, rows: int) -> None:

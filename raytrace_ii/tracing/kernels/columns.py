@@ -77,27 +77,40 @@ def find_mates(corners, table, mates):
             place = (place + np.uint64(1)) & mask
 
 
+@stage_kernel
+def _project(turn, corners, f, s):
+    """Fill ``s`` (OF_FACE,): u, v and h of the corners of a face."""
+    for k in range(3):
+        i = 9 * f + 3 * k
+        x, y, z = np.float64(corners[i]), np.float64(corners[i + 1]), np.float64(corners[i + 2])
+        w = 1.0 / (turn[8] * x + turn[9] * y + turn[10] * z + turn[11])
+        s[U + k] = (turn[0] * x + turn[1] * y + turn[2] * z + turn[3]) * w
+        s[V + k] = (turn[4] * x + turn[5] * y + turn[6] * z + turn[7]) * w
+        s[H + k] = (turn[12] * x + turn[13] * y + turn[14] * z + turn[15]) * w
+
+
 @kernel
-def project_faces(turn, corners, seen):
-    """Fill ``seen`` (F, OF_FACE): u, v and h of the corners of each face."""
-    for f in range(seen.shape[0]):
-        for k in range(3):
-            i = 9 * f + 3 * k
-            x, y, z = np.float64(corners[i]), np.float64(corners[i + 1]), np.float64(corners[i + 2])
-            w = 1.0 / (turn[8] * x + turn[9] * y + turn[10] * z + turn[11])
-            seen[f, U + k] = (turn[0] * x + turn[1] * y + turn[2] * z + turn[3]) * w
-            seen[f, V + k] = (turn[4] * x + turn[5] * y + turn[6] * z + turn[7]) * w
-            seen[f, H + k] = (turn[12] * x + turn[13] * y + turn[14] * z + turn[15]) * w
+def find_extents(turn, corners, most, s, extents):
+    """Fill ``extents`` (3, 2): least and greatest u, v and h, each of faces that extend less than ``most``."""
+    for axis in range(3):
+        extents[axis, 0], extents[axis, 1] = math.inf, -math.inf
+    for f in range(corners.shape[0] // 9):
+        _project(turn, corners, f, s)
+        for axis in range(3):
+            a, b, c = s[3 * axis], s[3 * axis + 1], s[3 * axis + 2]
+            low, high = min(a, b, c), max(a, b, c)
+            if high - low < most[axis]:
+                extents[axis, 0], extents[axis, 1] = min(extents[axis, 0], low), max(extents[axis, 1], high)
 
 
 @stage_kernel
-def is_rim(seen, normals, mates, e):
-    """Whether a sheet ends, folds, or has a steep valley at an edge."""
+def is_rim(s, r, normals, mates, e):
+    """Whether a sheet ends, folds, or has a steep valley at an edge of face s, on whose other side is face r."""
     other = mates[e]
     if other < 0:
         return True
     f, k, g = e // 3, e % 3, other // 3
-    s, r, j, i, m = seen[f], seen[g], (k + 1) % 3, (k + 2) % 3, (other % 3 + 2) % 3
+    j, i, m = (k + 1) % 3, (k + 2) % 3, (other % 3 + 2) % 3
     # the edge, and from its start the third corners of both faces
     x, y, z = s[U + j] - s[U + k], s[V + j] - s[V + k], s[H + j] - s[H + k]
     a, b, c = s[U + i] - s[U + k], s[V + i] - s[V + k], s[H + i] - s[H + k]
@@ -117,13 +130,19 @@ def _column(x, last):
 
 
 @kernel
-def draw_rims(seen, normals, mates, size, rims):
+def draw_rims(turn, corners, normals, mates, size, work, rims):
     """Fill ``rims``: the greatest height of a rim in each column, by row and column."""
-    last = size - 1
+    last, s, r = size - 1, work[0], work[1]
     for e in range(mates.shape[0]):
-        if (mates[e] >= 0) & (mates[e] < e) or not is_rim(seen, normals, mates, e):
+        if e % 3 == 0:
+            _project(turn, corners, e // 3, s)
+        if (mates[e] >= 0) & (mates[e] < e):
             continue
-        s, k = seen[e // 3], e % 3
+        if mates[e] >= 0:
+            _project(turn, corners, mates[e] // 3, r)
+        if not is_rim(s, r, normals, mates, e):
+            continue
+        k = e % 3
         j = (k + 1) % 3
         if s[V + k] > s[V + j]:
             k, j = j, k
@@ -172,11 +191,11 @@ def _enter(sheets, layers, t, low, high, covers, slack):
 
 
 @kernel
-def draw_sheets(seen, size, slack, sheets, layers):
+def draw_sheets(turn, corners, size, slack, s, sheets, layers):
     """Fill ``sheets`` (columns, OF_SHEET), and of the uppermost one the ``layers`` at the middles of columns."""
     last = size - 1
-    for f in range(seen.shape[0]):
-        s = seen[f]
+    for f in range(corners.shape[0] // 9):
+        _project(turn, corners, f, s)
         a, b, c, d = s[U + 1] - s[U], s[V + 1] - s[V], s[U + 2] - s[U], s[V + 2] - s[V]
         area, p, q = a * d - b * c, s[H + 1] - s[H], s[H + 2] - s[H]
         sloped = abs(area) > 1e-9 * (a * a + b * b + c * c + d * d)
