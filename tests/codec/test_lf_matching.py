@@ -7,7 +7,7 @@ from codec.coders.lf import arithmetic, contexts, matching, synthesis
 from codec.coders.lf.agreement import new_matching
 from codec.coders.lf.blocks import predict_explicit
 from codec.coders.lf.kinds import DIFFERENT
-from codec.coders.lf.matching import CELLS, fill_products, new_match
+from codec.coders.lf.matching import CELLS, fill_errors, fill_products, new_match
 from codec.coders.lf.state import UNKNOWN, Job, new_blocks, new_work
 from codec.coders.lf.stream import UPRIGHT
 from tests.support.slow import first_fast
@@ -74,6 +74,18 @@ def test_the_table_holds_inner_products_of_the_differences(every):
                     expected = square.reshape(rows, 4, cols, 4).sum(axis=(1, 3))
                     # Sums of 16 products of up to 1800² in single precision.
                     np.testing.assert_allclose(match.products[:rows, :cols, at, k], expected, rtol=0, atol=20)
+
+
+@pytest.mark.parametrize("at_once", first_fast([52, 32]))
+def test_errors_are_sums_of_squared_differences(at_once):
+    """Of all references, at every disparity, also beyond the border."""
+    job, errors = example(), np.zeros((HIGH - LOW + 1, 9, 13), np.float32)
+    fill_errors(job, job.views[3], *(np.zeros(n, np.float32) for n in (at_once + 1, 4 * at_once, at_once)), errors)
+    for k, index in enumerate(range(LOW, HIGH + 1)):
+        d = index * UNIT / 256
+        missed = [moved(job.views[r, 0], d * down, d * across) - job.views[3, 0] for r, across, down in REFERENCES]
+        expected = np.square(missed).sum(axis=0).reshape(9, 4, 13, 4).sum(axis=(1, 3))
+        np.testing.assert_allclose(errors[k], expected, rtol=0, atol=60)
 
 
 def test_a_hurried_search_has_the_disparities_of_the_synthesis():

@@ -18,7 +18,6 @@ from .transform import LARGEST, sides
 from .warp import clamped, led, moved_block
 
 PAIRS = MOST_REFERENCES * (MOST_REFERENCES + 1) // 2  # the lower triangle by rows
-DIAGONAL = 0, 2, 5, 9
 CELLS = LARGEST // 4
 HUGE = np.float32(1e30)
 MOST_BEST, BEST = 6, 2  # disparities of least error by the table that are compared as decoded; in a hurried search
@@ -114,8 +113,11 @@ def _between_rows(upper, lower, at, fy):
 
 @part_kernel
 def _missed_rows(plane, original, y0, x0, dy, dx, between, missed):
-    """Fill missed with four rows of 32 samples: the plane moved, between samples bilinearly, less the original."""
-    height, width = plane.shape
+    """Fill missed with four rows of samples: the plane moved, between samples bilinearly, less the original.
+
+    ``between`` has room for one more than a row.
+    """
+    (height, width), row = plane.shape, between.size - 1
     iy, start = dy >> 8, x0 + (dx >> 8)
     fx, fy = np.float32((dx & 255) / 256), np.float32((dy & 255) / 256)
     # The row between two begins and ends with so many repetitions of the border's samples.
@@ -129,9 +131,9 @@ def _missed_rows(plane, original, y0, x0, dy, dx, between, missed):
             between[x] = _between_rows(upper, lower, 0, fy)
         for x in range(within, between.size):
             between[np.uint64(x)] = _between_rows(upper, lower, width - 1, fy)
-        for x in range(min(LARGEST, width - x0)):
+        for x in range(min(row, width - x0)):
             moved = (np.float32(1) - fx) * between[x] + fx * between[x + 1]
-            missed[np.uint64(LARGEST * i + x)] = moved - np.float32(own[np.uint64(x0 + x)])
+            missed[np.uint64(row * i + x)] = moved - np.float32(own[np.uint64(x0 + x)])
 
 
 @stage_kernel
@@ -203,6 +205,28 @@ def fill_products(job, original, y0, x0, match):
             for bx in range(cols):
                 for at in range(count * (count + 1) >> 1):
                     products[by, bx, at, k] = _of_cell(sums[at], bx)
+
+
+@lean_kernel
+def fill_errors(job, original, between, missed, sums, errors):
+    """errors[k, y, x] = squared differences of 4×4 samples from all references, of the indices from job.low on.
+
+    ``between`` (n + 1,), ``missed`` (4 n,) and ``sums`` (n,) are memory for n columns at once.
+    """
+    height, width = original.shape[1:]
+    for x0 in range(0, width, sums.size):
+        cells = min(sums.size, width - x0) >> 2
+        for y0 in range(0, height, 4):
+            for k in range(errors.shape[0]):
+                into = errors[k, y0 >> 2, x0 >> 2 :]
+                for r in range(job.references.shape[0]):
+                    dy, dx = led(job.references, r, (job.low + k) * job.unit, y0, x0, (height, width))
+                    plane = job.views[job.references[r, 0], 0]
+                    _missed_rows(plane, original[0], y0, x0, dy, dx, between, missed)
+                    sums[:] = 0
+                    _add_rows(missed, missed, 0, sums.size, sums)
+                    for cell in range(cells):
+                        into[np.uint64(cell)] += _of_cell(sums, cell)
 
 
 @part_kernel

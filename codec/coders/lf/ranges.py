@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .matching import DIAGONAL, fill_products, new_match
+from .matching import fill_errors
 from .rig import Rig, departing
 from .state import Job
 from .stream import UPRIGHT
@@ -154,13 +154,9 @@ def cell_errors(
         blocks=blank,
         levels=blank,
     )
-    match = new_match(high - low + 1, 1)
-    for y0 in range(0, height, LARGEST):
-        for x0 in range(0, width, LARGEST):
-            fill_products(job, original, y0, x0, match)
-            rows, cols = min(LARGEST, height - y0) // 4, min(LARGEST, width - x0) // 4
-            squares = match.products[:rows, :cols, DIAGONAL[: len(references)]].sum(axis=2)
-            errors[:, y0 // 4 : y0 // 4 + rows, x0 // 4 : x0 // 4 + cols] = squares.transpose(2, 0, 1)
+    at_once = width if rig is None else LARGEST  # columns of one shift
+    rows = (np.zeros(size, np.float32) for size in (at_once + 1, 4 * at_once, at_once))
+    fill_errors(job, original, *rows, errors)
     return errors
 
 

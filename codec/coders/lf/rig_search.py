@@ -33,6 +33,7 @@ HELD = 0.02
 OVERLAPPING = 0.25  # of a view's shorter side: disparity from the middle to the outermost view must not lead farther
 # A table is written if differences fall to this part, and not looked for further if smoothed views stay above that.
 WORTH, HOPELESS = 0.93, 0.975
+ERRORS, CELLS, ENTRIES = range(3)  # what a registration tells, each beside those before it
 _UNITS = np.array([PLACE_UNIT / UPRIGHT] * 2 + [SHIFT_UNIT / 256] * 6)
 
 
@@ -114,14 +115,14 @@ class _Registration:
         """Return the sum of differences, which count up to three times the scale of their view in another fit."""
         total = 0.0
         for at in self.others:
-            differences = self._register(at, fit)[0]
+            differences = self._register(at, fit, ERRORS)[0]
             total += float(np.minimum(np.abs(differences), 3 * limiting.scales[at]).sum())
         return total
 
     def improve(self, fit: _Fit) -> None:
         """Take some turns."""
         for at in self.others:
-            differences = self._register(at, fit)[0]
+            differences = self._register(at, fit, ERRORS)[0]
             fit.scales[at] = OUTLYING * float(np.median(np.abs(differences))) + LEAST_OUTLYING
         for _ in range(TURNS):
             self._turn(fit)
@@ -130,7 +131,7 @@ class _Registration:
         """Take a step of the cells' disparity, and of the entries if these are moving."""
         tops, bottoms = (np.zeros(fit.disparity.shape) for _ in range(2))
         for at in self.others:
-            _, squares, side, top, bottom = self._register(at, fit)
+            _, squares, side, top, bottom = self._register(at, fit, ENTRIES if fit.moving else CELLS)
             tops, bottoms = tops + top, bottoms + bottom
             if fit.moving:
                 held = HELD * np.diag(squares)[2:4]
@@ -152,10 +153,10 @@ class _Registration:
             fit.entries[:, fields] -= share * self.leads
             fit.disparity = fit.disparity + share * by
 
-    def _register(self, at: int, fit: _Fit) -> tuple[NDArray[np.float64], ...]:
+    def _register(self, at: int, fit: _Fit, told: int) -> tuple[NDArray[np.float64], ...]:
         middle, other, lead = self.views[self.middle], self.views[at], self.leads[at]
         found: tuple[NDArray[np.float64], ...] = _registered(
-            middle, other, fit.disparity, lead, fit.entries[at], self.every, fit.scales[at]
+            middle, other, fit.disparity, lead, fit.entries[at], self.every, fit.scales[at], told
         )
         return found
 
@@ -169,8 +170,8 @@ def _smoothed(luma: NDArray[np.float32], count: int) -> NDArray[np.float32]:
 
 
 @array_kernel
-def _registered(middle, other, disparity, lead, entry, every, scale):
-    """Return differences of samples, normal equations of the view's entry, and of each cell's disparity."""
+def _registered(middle, other, disparity, lead, entry, every, scale, told):
+    """Return differences of samples, normal equations of the view's entry, and of each cell's disparity, if told."""
     height, width = middle.shape
     side = max(height, width)
     errors = np.zeros(((height + every - 1) // every) * ((width + every - 1) // every), np.float32)
@@ -194,13 +195,16 @@ def _registered(middle, other, disparity, lead, entry, every, scale):
             error = middle[y, x] - (upper + fy * (lower - upper))
             errors[number] = error
             number += 1
+            if told == ERRORS:
+                continue
             weight = 1 / (1 + (error / scale) ** 2)
-            row[0], row[1], row[2], row[3] = gx * d, gy * d, gx, gy
-            row[4], row[5], row[6], row[7] = gx * u, gx * v, gy * u, gy * v
-            for k in range(8):
-                right[k] += weight * row[k] * error
-                for m in range(k + 1):
-                    squares[k, m] += weight * row[k] * row[m]
+            if told == ENTRIES:
+                row[0], row[1], row[2], row[3] = gx * d, gy * d, gx, gy
+                row[4], row[5], row[6], row[7] = gx * u, gx * v, gy * u, gy * v
+                for k in range(8):
+                    right[k] += weight * row[k] * error
+                    for m in range(k + 1):
+                        squares[k, m] += weight * row[k] * row[m]
             along = gx * across + gy * down
             tops[y >> 2, x >> 2] += weight * along * error
             bottoms[y >> 2, x >> 2] += weight * along * along
