@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -87,10 +88,10 @@ def _best_lattice(
     view: Views, grid: tuple[int, int], middle: tuple[int, int], upright: Lattice, within: tuple[int, int]
 ) -> Lattice:
     """Return the lattice by which the middle view fits its neighbours best; the upright one unless it fits worse."""
-    limits = within[0] // UNIT, -(-within[1] // UNIT)
+    limits, kept = (within[0] // UNIT, -(-within[1] // UNIT)), cache(view)
 
     def misfit(lattice: Lattice) -> float:
-        return _misfit(cell_errors(view, grid, middle, lattice, limits))
+        return _misfit(cell_errors(kept, grid, middle, lattice, limits))
 
     best, least = upright, misfit(upright)
     bound = least * WORTH_SKEWING
