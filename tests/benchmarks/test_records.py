@@ -53,6 +53,7 @@ def test_a_changed_figure_and_an_unknown_mark_are_found(kept, tmp_path):
     assert "table takes " in wrong[0] and "no benchmark fills new" in wrong[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_all_record_files_are_valid(path):
     """On b1dc540 no test found the rows of coders.json, coders_full.json and fuzz.json with a false commit."""

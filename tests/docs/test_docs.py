@@ -27,6 +27,7 @@ from codec import decode, encode
 from ii_core import IICamera, camera_names, panel_display
 from ii_core.camera.optics import KINDS, LensModel
 from raytrace_ii.cli import app
+from tests.support.slow import first_fast
 
 ROOT = Path(__file__).parents[2]
 PAGES = {
@@ -145,7 +146,7 @@ def folder(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("page", [page for page, text in PAGES.items() if python_blocks(text)])
+@pytest.mark.parametrize("page", first_fast(page for page, text in PAGES.items() if python_blocks(text)))
 def test_python_runs(page, folder, monkeypatch):
     monkeypatch.chdir(folder)
     names = {"__name__": page}

@@ -112,6 +112,7 @@ def test_a_renamed_folder(package):
     assert called_in_a_process(package, "new.kernels") == (42, 1)
 
 
+@pytest.mark.slow
 def test_foreign_files(called, package):
     for file in (package / "old" / "__pycache__").glob("*.nb?"):
         file.write_bytes(b"\x80\x05cos\nabsent\n.")
