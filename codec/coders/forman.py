@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
-from ii_core.base.jit import array_kernel, inner_kernel, lean_kernel
+from ii_core.base.jit import array_kernel, part_kernel, stage_kernel
 
 from .. import clock
 from ..contract import Coder, Goal, Option, Options, Pixels
@@ -172,7 +172,7 @@ def _code(coder: Arithmetic, samples: NDArray[np.int16], picture: IIPicture, gro
     _code_blocks(coder, samples, (l, u, v), parts(k, group), parts(v, SIDE), parts(u, SIDE), step)
 
 
-@lean_kernel
+@part_kernel
 def _transformed(block, sizes, backward, half):
     """Transform a block (8, 8, 8) of int64 in place, along one axis after the other."""
     for axis in range(3):
@@ -196,7 +196,7 @@ def _transformed(block, sizes, backward, half):
                         block[i, j, a] = total >> 14
 
 
-@lean_kernel
+@stage_kernel
 def _near(levels, t, y, x):
     """Class 0–7 by the magnitudes of the six places one or two further along an axis."""
     total = np.int64(0)
@@ -210,7 +210,7 @@ def _near(levels, t, y, x):
     return total if total < 5 else (5 if total < 7 else (6 if total < 11 else 7))
 
 
-@lean_kernel
+@part_kernel
 def _code_levels(coder, levels, sizes, plane, before):
     """Write levels, or read them into zeros; return whether there are any."""
     count = sizes[0] * sizes[1] * sizes[2]
@@ -284,7 +284,7 @@ def _code_blocks(coder, samples, structure, groups, rows, cols, step):
                             _rebuild(samples[p], top, left, width, block, step)
 
 
-@inner_kernel
+@stage_kernel
 def _quantise(plane, top, left, width, block, step):
     """Fill the levels of a block with those of a plane's samples; ``width`` is that of an elementary image."""
     for t in range(block.sizes[0]):
@@ -301,7 +301,7 @@ def _quantise(plane, top, left, width, block, step):
                 block.levels[t, y, x] = -size if block.samples[t, y, x] < 0 else size
 
 
-@inner_kernel
+@stage_kernel
 def _rebuild(plane, top, left, width, block, step):
     """Write the samples that the levels of a block stand for to a plane."""
     for t in range(block.sizes[0]):

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.base.jit import inline_kernel, kernel
+from ii_core.base.jit import exact_stage_kernel, kernel
 
 # Alternately predictions of odd rows from even ones and updates of even rows from odd ones.
 STEPS = {
@@ -61,7 +61,7 @@ def backward_reversible(rows, levels):
         _lift_whole(rows, 1 << level, 1, -1)
 
 
-@inline_kernel
+@exact_stage_kernel
 def _neighbours(count, step, row):
     """Return the rows at a distance before and after a row; beyond an end, the row on the other side."""
     before, after = row - step, row + step
@@ -72,7 +72,7 @@ def _neighbours(count, step, row):
     return before, after
 
 
-@inline_kernel
+@exact_stage_kernel
 def _lift(rows, step, odd, factor):
     """Add to every even or odd row of the grid of ``step`` the sum of its neighbours times a factor."""
     if rows.shape[0] > step:  # a single row has no neighbours and is its own low band
@@ -82,7 +82,7 @@ def _lift(rows, step, odd, factor):
                 rows[row, x] += factor * (rows[before, x] + rows[after, x])
 
 
-@inline_kernel
+@exact_stage_kernel
 def _lift_whole(rows, step, odd, sign):
     """Lift with the rounding of the reversible 5/3: odd rows −⌊(a + b)/2⌋, even rows +⌊(a + b + 2)/4⌋."""
     if rows.shape[0] > step:

@@ -129,16 +129,8 @@ def lane_kernel(function: Callable[..., Any]) -> Any:
     return lean_kernel(function, pipeline_class=_LaneCompiler)
 
 
-def inline_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a helper of a kernel, inlined as source into its callers."""
-    return numba.njit(nogil=True, inline="always")(function)
-
-
 def inner_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a lean kernel whose machine code is inlined into its callers.
-
-    It may have several returns. `inline_kernel` may not: numba inlines its source before types are inferred.
-    """
+    """Compile a lean kernel whose machine code is inlined into its callers, of which Python may be one."""
     return lean_kernel(function, forceinline=True)
 
 
@@ -152,7 +144,7 @@ def part_kernel(function: Callable[..., Any], **options: Any) -> Any:
 
 
 def stage_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a part whose machine code is inlined into its callers, as that of `inner_kernel` is."""
+    """Compile a part whose machine code is inlined into its callers."""
     return part_kernel(function, forceinline=True)
 
 

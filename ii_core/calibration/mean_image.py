@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.extras import Lazy
-from ..base.jit import kernel
+from ..base.jit import exact_stage_kernel, kernel
 from .peaks import Floats, Vectors
 
 ndimage = Lazy("scipy.ndimage")
@@ -76,7 +76,7 @@ class MeanImage:
         return found, good & (np.hypot(*(found - places).T) <= reach)
 
 
-@kernel
+@exact_stage_kernel
 def _margin(x, y, sides):
     """Return how far within a lens an offset lies; negative outside."""
     margin = math.inf

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.jit import exact_stage_kernel, inline_kernel, kernel
+from ..base.jit import exact_stage_kernel, kernel
 
 # Least neighbours of a half: a single one often agrees by chance. More would also exclude lenses at the border.
 FEWEST = 2
@@ -30,7 +30,7 @@ class Star(NamedTuple):
     own: Any  # the neighbour at step 0
 
 
-@inline_kernel
+@exact_stage_kernel
 def _between(pixels, m, n, x, y):
     """Interpolate the colour at the shares x and y from pixel (m, n) to its right and lower neighbours."""
     # At a weight of 0 the neighbour may lie outside the picture.

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.base.jit import inline_kernel
 from ii_core.base.jit import lean_kernel as kernel
+from ii_core.base.jit import stage_kernel
 
 UNITS = 1024  # of a pixel's side: edges are found on whole ones
 DONE, CUT, OPEN = 0, 1, 2  # what becomes of a cell
@@ -76,20 +76,20 @@ def count_rays(pixels, rays):
         rays[pixels[i]] += 1
 
 
-@inline_kernel
+@stage_kernel
 def _apart(points, i, j):
     """Largest difference between the codes of two points."""
     c = points.code
     return max(abs(c[i, 0] - c[j, 0]), max(abs(c[i, 1] - c[j, 1]), abs(c[i, 2] - c[j, 2])))
 
 
-@inline_kernel
+@stage_kernel
 def _along(points, i, j):
     n = points.normal
     return n[i, 0] * n[j, 0] + n[i, 1] * n[j, 1] + n[i, 2] * n[j, 2]
 
 
-@inline_kernel
+@stage_kernel
 def _one_surface(points, i, j):
     return points.body[i] == points.body[j] and (points.body[i] < 0 or _along(points, i, j) >= SAME_WAY)
 
@@ -207,7 +207,7 @@ def boxes(locations, directions, far, low, scale, out):
         out[i] = number
 
 
-@inline_kernel
+@stage_kernel
 def _like(points, i, j, step):
     return _one_surface(points, i, j) and _apart(points, i, j) <= LIKE * step
 
@@ -226,7 +226,7 @@ def nearest_around(reach, lens, out):
             out[y * width + x] = least if least < math.inf else math.nan
 
 
-@inline_kernel
+@stage_kernel
 def _right_down(corner):
     """A corner's place, in pixels right and down; corners and sides run around from the left top, side 0 on top."""
     return int(corner == 1 or corner == 2), int(corner >= 2)
@@ -283,7 +283,7 @@ def open_pixels(pixels, lens, corner_of, points, plain, error, next_point, corne
     return alike, new
 
 
-@inline_kernel
+@stage_kernel
 def _four_alike(points, first, width, error):
     """Whether four centres around a corner are on one surface and of one colour."""
     good = True
@@ -295,7 +295,7 @@ def _four_alike(points, first, width, error):
     return good
 
 
-@inline_kernel
+@stage_kernel
 def _mean_point(points, first, width, row):
     points.body[row] = points.body[first]
     for c in range(3):
@@ -306,7 +306,7 @@ def _mean_point(points, first, width, row):
         points.light[row, c], points.code[row, c] = light * np.float32(0.25), code * np.float32(0.25)
 
 
-@inline_kernel
+@stage_kernel
 def _group(points, i, a, b, surfaces, step):
     """To which of two points a third belongs: by surface if they are on two, else by colour."""
     found = NEITHER
@@ -335,8 +335,14 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
     height, width = lens.shape
     q, light = points.code, points.light
     for i in range(pixels.shape[0]):
-        pixel, k = pixels[i], corners[i]
-        p0, p1, p2, p3 = k[0], k[1], k[2], k[3]
+        pixel = np.int64(pixels[i])
+        p0, p1, p2, p3 = (
+            np.int64(corners[i, 0]),
+            np.int64(corners[i, 1]),
+            np.int64(corners[i, 2]),
+            np.int64(corners[i, 3]),
+        )
+        k = p0, p1, p2, p3
         surfaces = _one_surface(points, p1, p0) and _one_surface(points, p2, p0) and _one_surface(points, p3, p0)
         surfaces &= _one_surface(points, pixel, p0)
         most, wrong = np.float32(0), np.float32(0)
@@ -392,7 +398,7 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
                 wanted[b * width + a] = True
 
 
-@inline_kernel
+@stage_kernel
 def _differs(points, i, j, error):
     return points.body[i] != points.body[j] and _apart(points, i, j) * MISSED > error
 
@@ -425,19 +431,19 @@ def find_thin(pixels, corners, points, error, lens, thin):
         alone = True
         for k in range(4):
             right, down = _right_down(k)
-            alone &= _differs(points, pixels[i], corners[i, k], error)
+            alone &= _differs(points, np.int64(pixels[i]), np.int64(corners[i, k]), error)
             corner_alone = True
             for around in range(4):
                 b, a = y + down - 1 + around // 2, x + right - 1 + around % 2
                 if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
-                    corner_alone &= _differs(points, corners[i, k], b * width + a, error)
+                    corner_alone &= _differs(points, np.int64(corners[i, k]), b * width + a, error)
             if corner_alone:
                 _mark(lens, y + down - 1, y + down, x + right - 1, x + right, lens[y, x], thin)
         if alone:
             _mark(lens, y - 1, y + 1, x - 1, x + 1, lens[y, x], thin)
 
 
-@inline_kernel
+@stage_kernel
 def _mark(lens, top, bottom, left, right, of, out):
     height, width = lens.shape
     for b in range(max(top, 0), min(bottom + 1, height)):
@@ -508,7 +514,7 @@ def probe_sides(sides, points, error, bodies, which, places):
     front, back = 0, sides.pixel.shape[0]
     for i in range(sides.pixel.shape[0]):
         left = sides.high[i] - sides.low[i]
-        one, other = sides.ends[i, 0], sides.ends[i, 1]
+        one, other = np.int64(sides.ends[i, 0]), np.int64(sides.ends[i, 1])
         # two crossings, each anywhere in what is left: a standard error of 0.2 of it
         if sides.bad[i] or left <= 1 or 0.2 / UNITS * left * _apart(points, one, other) <= 0.6 * error:
             continue
@@ -530,7 +536,7 @@ def narrow_sides(sides, which, first, points):
     """Take what the places of `probe_sides` show, points from ``first`` on, to their sides."""
     for j in range(which.shape[0]):
         i = which[j]
-        one, other = sides.ends[i, 0], sides.ends[i, 1]
+        one, other = np.int64(sides.ends[i, 0]), np.int64(sides.ends[i, 1])
         step = _apart(points, one, other)
         group = _group(points, first + j, one, other, not _one_surface(points, one, other), step)
         at = (sides.low[i] + sides.high[i]) // 2
@@ -542,17 +548,18 @@ def narrow_sides(sides, which, first, points):
             sides.bad[i] = True
 
 
-@inline_kernel
+@stage_kernel
 def _ends_of_groups(points, corners, i, bits):
     """A corner of each group, and the largest step between corners."""
-    first, second, step = corners[i, 0], corners[i, 0], np.float32(0)
+    first, second, step = np.int64(corners[i, 0]), np.int64(corners[i, 0]), np.float32(0)
     for a in range(4):
+        corner = np.int64(corners[i, a])
         if (bits >> a & 1) == 0:
-            first = corners[i, a]
+            first = corner
         else:
-            second = corners[i, a]
+            second = corner
         for b in range(a):
-            step = max(step, _apart(points, corners[i, a], corners[i, b]))
+            step = max(step, _apart(points, corner, np.int64(corners[i, b])))
     return first, second, step
 
 
@@ -611,7 +618,7 @@ def chords(pixels, corners, groups, of_cell, sides, points, error, verdict, shar
         if abs(across) > away:
             surfaces = not _one_surface(points, first, second)
             expected = FIRST if (across > 0.0) == (far0 > 0.0) else SECOND
-            bad |= _group(points, pixels[i], first, second, surfaces, step) != expected
+            bad |= _group(points, np.int64(pixels[i]), first, second, surfaces, step) != expected
         verdict[i] = OPEN if bad else CUT
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from ii_core.base.jit import inline_kernel
 from ii_core.base.jit import lean_kernel as kernel
+from ii_core.base.jit import stage_kernel
 
 HALF_DIAGONAL = 0.75  # of a pixel, with something to spare
 WIDER, SPARE = 1.02, 0.01  # how much wider than rods strips around them are, times and in pixels
 MOST_STRIP = 0.5  # of a pixel
 
 
-@inline_kernel
+@stage_kernel
 def _touches(x, y, z, u, v, w, radius, dx, dy, dz, width, spread):
     """Whether a rod from x, y, z along u, v, w may be seen in the pixel around a unit direction from the origin."""
     turned = u * dx + v * dy + w * dz
@@ -45,7 +45,7 @@ def touched(locations, directions, rods, width, spread, one):
         one[i] = found
 
 
-@inline_kernel
+@stage_kernel
 def _seen_at(rods, b, end, place, d, right, down):
     """Where an end of a rod is seen, in pixels from the centre right and down, and its way along the ray."""
     x, y, z = rods[b, end] - place[0], rods[b, end + 1] - place[1], rods[b, end + 2] - place[2]
@@ -60,7 +60,7 @@ def _seen_at(rods, b, end, place, d, right, down):
     return (a * ss - c * rs) / det, (c * rr - a * rs) / det, along
 
 
-@inline_kernel
+@stage_kernel
 def _turn(rods, b, d):
     """Cosine between a rod and a unit direction; 1 of a rod without length."""
     u, v, w = rods[b, 3] - rods[b, 0], rods[b, 4] - rods[b, 1], rods[b, 5] - rods[b, 2]
@@ -102,7 +102,7 @@ def strips(locations, directions, right, down, rods, one, strip):
         strip[i, 5] = 0.0 if not seen else (half if (high - low) * 2.0 * half < MOST_STRIP else -1.0)
 
 
-@inline_kernel
+@stage_kernel
 def _across(strip, along):
     middle = strip[3] + strip[4] * along
     return min(max(middle - strip[5], 0.0), 1.0), min(max(middle + strip[5], 0.0), 1.0)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, kernel
+from ii_core.base.jit import exact_stage_kernel, kernel
 
 from ..tracing.kernels.glossy import LOW, mix_bits
 
@@ -42,7 +42,7 @@ def places(seed, m, n, columns, first, count, pair, table, lens, out):
             out[i * count + j, 1] = _scrambled(_sobol(index), down) * (1.0 / 4294967296.0)
 
 
-@inline_kernel
+@exact_stage_kernel
 def _turned(places, bits, out):
     """Places in the unit square, turned or mirrored by the last three bits."""
     swapped = int(bits & _ONE)
@@ -80,7 +80,7 @@ def near_together(m, n, places, parts, pixels, traced, columns, rows, within):
         row += (last - first) * count
 
 
-@inline_kernel
+@exact_stage_kernel
 def _part(places, i, j, parts):
     return int(places[i, j, 1] * parts) * parts + int(places[i, j, 0] * parts)
 
@@ -169,7 +169,7 @@ def standard_errors(quarters, which, step, n, curve, out):
         out[i] = worst
 
 
-@inline_kernel
+@exact_stage_kernel
 def _code(x, curve):
     last = curve.shape[0] - 1
     at = min(max(x, 0.0), 1.0) * last
@@ -180,7 +180,7 @@ def _code(x, curve):
 _ONE = np.uint64(1)
 
 
-@kernel
+@exact_stage_kernel
 def _sobol(index):
     """The second dimension of Sobol's sequence, as a fraction of 2³²."""
     bits, direction = np.uint64(0), np.uint64(0x80000000)
@@ -192,7 +192,7 @@ def _sobol(index):
     return bits
 
 
-@inline_kernel
+@exact_stage_kernel
 def _reversed(x):
     x = ((x & np.uint64(0x55555555)) << np.uint64(1)) | ((x >> np.uint64(1)) & np.uint64(0x55555555))
     x = ((x & np.uint64(0x33333333)) << np.uint64(2)) | ((x >> np.uint64(2)) & np.uint64(0x33333333))
@@ -201,7 +201,7 @@ def _reversed(x):
     return ((x & np.uint64(0xFFFF)) << np.uint64(16)) | (x >> np.uint64(16))
 
 
-@kernel
+@exact_stage_kernel
 def _scrambled(x, seed):
     """Owen's scramble: each bit is flipped or not by a hash of all bits before it."""
     x = (_reversed(x) + seed) & LOW

@@ -39,6 +39,7 @@ def rendering():
         for camera in preset("setup1", scale=64), preset("pinhole2d", scale=64):
             render(scene, camera, support=("depth", "normal"))
     render(hall(), preset("setup1", scale=128), samples=(4, 16), error=4.0)
+    render(load_scene("twins"), preset("pinhole2d", scale=32), error=2.0)
     render(hall(), preset("setup1", scale=128), samples=4, dtype="float32", audit=0.1)
     trace(hall(), np.zeros((99, 3)), np.ones((99, 3)))
     hexagonal = render(load_scene("apples"), preset("hexagonal", scale=8)).picture

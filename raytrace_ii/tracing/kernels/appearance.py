@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, lane_stage, late_kernel, late_lane_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import lane_stage, late_kernel, late_lane_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
@@ -156,7 +156,7 @@ def look_closely(generation, first, lanes, _):
                 _gild(k, mapped and whole[at.IMAGE + k] >= 0, s, g.work)
 
 
-@inline_kernel
+@stage_kernel
 def _is_special(k, single):
     return single[at.HIT + k] * single[at.EXTRA + k] > _ZERO
 
@@ -231,7 +231,7 @@ def _take_patterns(lanes, surfaces, work):
     return some
 
 
-@inline_kernel
+@stage_kernel
 def _place_on_pattern(k, single):
     """Texture coordinates of one hit, products in float32: patterns at borders of pixels depend on their rounding."""
     u, v, c = single[at.U + k], single[at.V + k], at.COORDINATE + k

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import exact_lane_stage, inline_kernel, late_lane_kernel
+from ii_core.base.jit import exact_lane_stage, late_lane_kernel
 from ii_core.base.jit import lane_stage as stage_kernel
 
 from . import lanes as at
@@ -161,7 +161,7 @@ def up_to_smooth(single):
         )  # fmt: skip
 
 
-@inline_kernel
+@stage_kernel
 def _up(single, n, p, share, px, py, pz, gx, gy, gz):
     """A share of the way up onto the tangent plane of the corner ``p`` with the normal ``n``, if it lies above."""
     nx, ny, nz = single[n], single[n + BLOCK], single[n + 2 * BLOCK]

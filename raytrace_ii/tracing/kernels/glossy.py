@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, part_kernel
 from ii_core.base.jit import lean_kernel as kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 # numba makes 64 bits of a sum of two 32-bit numbers: fractions of 32 bits stand in 64-bit words, cut by `LOW`.
 LOW = np.uint64(0xFFFFFFFF)
@@ -18,7 +18,7 @@ LOW = np.uint64(0xFFFFFFFF)
 R2_ACROSS, R2_AROUND = np.uint64(3242174889), np.uint64(2447445414)
 
 
-@inline_kernel
+@stage_kernel
 def mix_bits(h):
     """splitmix64's finaliser (Steele, Lea, Flood 2014)."""
     h = h + np.uint64(0x9E3779B97F4A7C15)
@@ -93,7 +93,7 @@ def glossy_direction(alpha, across, around, dx, dy, dz, nx, ny, nz):
     return rx * tx + ry * bx + rz * nx, rx * ty + ry * by + rz * ny, rx * tz + ry * bz + rz * nz, share
 
 
-@inline_kernel
+@stage_kernel
 def _smith(alpha, cosine):
     """Smith's Λ of a GGX surface."""
     return 0.5 * (math.sqrt(1.0 + alpha * alpha * (1.0 / (cosine * cosine) - 1.0)) - 1.0)

@@ -11,7 +11,7 @@ from numba import types
 from numba.core.typing import templates
 from numpy.typing import NDArray
 
-from ii_core.base.jit import inline_kernel
+from ii_core.base.jit import stage_kernel
 
 BLOCK = 16  # rays that go from their start to their light together: what is kept of them stays in the first cache
 LINE = 64  # bytes of a cache line
@@ -105,7 +105,7 @@ FACE, TABLE_ROW, BODY, NOISY, OCTAVES, SEED, IMAGE, LEVEL_ROW = _offsets(8)
 _WHOLES = next(_offset)
 
 
-@inline_kernel
+@stage_kernel
 def slot(quantity, lane):
     """Index of a lane's number: unsigned, so that numba need not look for negative ones.
 

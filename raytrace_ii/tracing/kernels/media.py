@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from .tables import IOR, PRIORITY, TRANSMISSION
 
@@ -74,26 +74,26 @@ def cross(inside, i, body, entering):
         leave(inside, i, body)
 
 
-@inline_kernel
+@stage_kernel
 def refractive_index(materials, body, c):
     """Index of refraction of a body for a channel, 1 outside of all."""
     return np.float64(materials[body, IOR + c]) if body >= 0 else 1.0
 
 
-@inline_kernel
+@stage_kernel
 def disperses(materials, body):
     return body >= 0 and (
         materials[body, IOR] != materials[body, IOR + 1] or materials[body, IOR] != materials[body, IOR + 2]
     )
 
 
-@inline_kernel
+@stage_kernel
 def clearness(materials, body):
     """The largest share of a colour that a body lets through."""
     return max(materials[body, TRANSMISSION], materials[body, TRANSMISSION + 1], materials[body, TRANSMISSION + 2])
 
 
-@inline_kernel
+@stage_kernel
 def transmits(materials, body):
     return (
         max(materials[body, TRANSMISSION], materials[body, TRANSMISSION + 1], materials[body, TRANSMISSION + 2]) > 0.0

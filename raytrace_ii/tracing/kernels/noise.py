@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, inner_kernel, stage_kernel
+from ii_core.base.jit import inner_kernel, stage_kernel
 from ii_core.base.jit import lean_kernel as kernel
 
 from . import lanes as at
@@ -37,7 +37,7 @@ def gradient_noise(x, y, z, seed):
     return _lerp(w, near, far)
 
 
-@inline_kernel
+@stage_kernel
 def vectors(lanes):
     """So many lanes, up to whole vectors of eight."""
     return (lanes + 7) // 8 * 8
@@ -86,12 +86,12 @@ def terrain(x, z, seed, octaves, rough, ridged, out):
             out[i, j] = total / most if ridged else total
 
 
-@inline_kernel
+@stage_kernel
 def _fade(t):
     return t * t * t * (t * (t * 6 - 15) + 10)
 
 
-@inline_kernel
+@stage_kernel
 def _lerp(t, a, b):
     return a + t * (b - a)
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ii_core.base.jit import exact_kernel as kernel
 from ii_core.base.jit import exact_lane_stage as stage_kernel
-from ii_core.base.jit import inline_kernel, lane_kernel, part_kernel
+from ii_core.base.jit import lane_kernel, part_kernel
 
 from . import lanes as at
 from .addresses import call
@@ -69,7 +69,7 @@ class Tools(NamedTuple):
     chosen: NDArray[np.int32]
 
 
-@inline_kernel
+@stage_kernel
 def place_hit(ox, oy, oz, dx, dy, dz, x, y, z, x1, y1, z1, x2, y2, z2):
     """u, v and distance where a ray meets the plane of a face of three corners (Möller, Trumbore 1997).
 

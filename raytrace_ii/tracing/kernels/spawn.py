@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, late_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import late_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
@@ -70,7 +70,7 @@ def spawn(generation, first, lanes, _):
             _reflect(k, i, m0, m1, m2, rays, passage, following, work, counts)
 
 
-@inline_kernel
+@stage_kernel
 def _mirrored(k, single):
     """Weights of the light that one lane mirrors."""
     return (
@@ -206,7 +206,7 @@ def _reflect(k, i, m0, m1, m2, rays, passage, following, work, counts):
     _send(k, i, REFLECTION, ox, oy, oz, rx, ry, rz, m0, m1, m2, rays, passage, following, work, counts)
 
 
-@inline_kernel
+@stage_kernel
 def _in_lobe(key, step):
     """A place in [0, 1)²: the key's own, ``step`` places on along the R2 sequence (Roberts 2018)."""
     step = np.uint64(step)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from .lanes import bits_of, single_of
 from .tables import ALPHA_BLEND, CHECKER, CUTOFF, IMAGE, LEVELS, MIRROR, REPEAT, TEXTURE, VERTEX
@@ -53,7 +53,7 @@ def noise_colour(table, row, total):
     return _between(table, row, min(max(0.5 + table[row, 11] * total, 0.0), 1.0))
 
 
-@inline_kernel
+@stage_kernel
 def _between(table, row, t):
     return (
         table[row, 4] + t * (table[row, 7] - table[row, 4]),
@@ -92,7 +92,7 @@ def footprint(ax, ay, az, bx, by, bz, u1, v1, u2, v2, width, dx, dy, dz, gx, gy,
     return i * u1 + j * u2, i * v1 + j * v2, k * u1 + l * u2, k * v1 + l * v2
 
 
-@inline_kernel
+@stage_kernel
 def filter_taps(width, height, levels, au, av, bu, bv):
     """Number of taps, level of each, and the way over (u, v) that they lie along: the longer of two diameters.
 
@@ -111,7 +111,7 @@ def filter_taps(width, height, levels, au, av, bu, bv):
     return taps, min(max(level, _ZERO), levels), bu, bv
 
 
-@inline_kernel
+@stage_kernel
 def logarithm(x):
     """Logarithm to base 2 of a float32 from 1 on: exponent, and a series in the mantissa, for vectors."""
     number = bits_of(x)
@@ -122,7 +122,7 @@ def logarithm(x):
     return np.float32(np.int32(number >> _23) - _127) + t * series
 
 
-@inline_kernel
+@stage_kernel
 def exponential(x):
     """e^x of a float32 up to 0: exponent, and a series of the rest, for vectors; below 2⁻¹²⁶ that."""
     y = max(x * _PER_OCTAVE, _LEAST_EXPONENT)
@@ -132,7 +132,7 @@ def exponential(x):
     return series * single_of(np.int32((np.int32(n) + _127) << _23))
 
 
-@inline_kernel
+@stage_kernel
 def texels_about(x, y, width, height, repeats_across, repeats_down):
     """The texels about a place folded into an image, from its upper left corner in widths and heights.
 
@@ -147,7 +147,7 @@ def texels_about(x, y, width, height, repeats_across, repeats_down):
     return i0, i1, j0, j1, x - i, y - j
 
 
-@inline_kernel
+@stage_kernel
 def folded(t, wrap):
     """A texture coordinate taken into the image, [0, 1]; for vectors."""
     mirrored = abs(t - 2.0 * np.floor(0.5 * t + 0.5))  # from the nearest even number

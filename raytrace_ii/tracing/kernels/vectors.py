@@ -6,17 +6,17 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, part_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from .lanes import BLOCK
 
 
-@inline_kernel
+@stage_kernel
 def put(rows, i, x, y, z):
     rows[i, 0], rows[i, 1], rows[i, 2] = x, y, z
 
 
-@inline_kernel
+@stage_kernel
 def interpolate(values, f, u, v):
     w = 1.0 - u - v
     return (
@@ -26,7 +26,7 @@ def interpolate(values, f, u, v):
     )
 
 
-@inline_kernel
+@stage_kernel
 def edge(corners, f, k):
     return (
         np.float64(corners[f, k, 0]) - corners[f, 0, 0],
@@ -35,7 +35,7 @@ def edge(corners, f, k):
     )
 
 
-@inline_kernel
+@stage_kernel
 def pull_by(lift, one, ax, ay, az, bx, by, bz):
     """Share of the way to the middle of a face that is about as long as its lift, by its lift and two edges."""
     cx, cy, cz = bx - ax, by - ay, bz - az
@@ -43,7 +43,7 @@ def pull_by(lift, one, ax, ay, az, bx, by, bz):
     return min(lift / math.sqrt(longest if longest > 0 else one), one / 4)
 
 
-@inline_kernel
+@stage_kernel
 def start_point(corners, faces, f, u, v):
     """The hit point drawn a hair towards the middle of its face, for rays to start from.
 
@@ -66,24 +66,24 @@ def behind(surfaces, f, u, v, entering):
     return px + lift * faces[f, 0], py + lift * faces[f, 1], pz + lift * faces[f, 2]
 
 
-@inline_kernel
+@stage_kernel
 def put_behind(out, i, surfaces, f, u, v, entering):
     x, y, z = behind(surfaces, f, u, v, entering)
     put(out, i, x, y, z)
 
 
-@inline_kernel
+@stage_kernel
 def three(values, first, k):
     """Three quantities of a lane that follow each other."""
     return values[first + k], values[first + BLOCK + k], values[first + 2 * BLOCK + k]
 
 
-@inline_kernel
+@stage_kernel
 def three_of_row(rows, i):
     return rows[i, 0], rows[i, 1], rows[i, 2]
 
 
-@inline_kernel
+@stage_kernel
 def three_doubles(values, first, k):
     """As `three`, of float32 to float64."""
     return (
