@@ -453,6 +453,7 @@ def test_adaptive_samples(run, tmp_path):
     np.testing.assert_array_equal(IIPicture.load(tmp_path / "p.png").pixels, shot.picture.pixels)
 
 
+@pytest.mark.slow
 def test_audit(run, refused, tmp_path):
     code, out, _ = run(*OBJECTS, "-o", tmp_path / "p.png", "--audit", 0.1)
     shot = render(load_scene("objects"), CAMERA, audit=0.1)

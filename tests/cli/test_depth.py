@@ -81,6 +81,7 @@ def test_focus_at_whole_disparities_is_the_mean_of_shifted_views(run, field, tmp
     np.testing.assert_allclose(read_image(tmp_path / "f.tif")[8:32, 8:40], inner, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_focus_everywhere_a_stack_and_a_tilted_plane(run, field, tmp_path):
     path, _ = field
     code, _, err = run("focus", path, "--all-in-focus", "-o", tmp_path / "all.png")

@@ -6,6 +6,7 @@ import pytest
 from ii_core import IIPicture, Rig, preset, sub_images
 from ii_core.base.files import read_image, write_image
 from ii_core.formats.pfm import read_pfm
+from tests.support.slow import first_fast
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ def test_flips_are_overridden(run, shot, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("kind", "count", "size"), [("si", 256, (16, 32)), ("ri", 256, (32, 16)), ("ei", 512, (16, 16))]
+    ("kind", "count", "size"), first_fast([("si", 256, (16, 32)), ("ri", 256, (32, 16)), ("ei", 512, (16, 16))])
 )
 def test_components(run, shot, tmp_path, kind, count, size):
     sheet = tmp_path / "sheet.png"

@@ -167,7 +167,7 @@ def test_eight_bits_come_back_to_the_bit(scheme):
     np.testing.assert_array_equal(decoded.pixels, textured().pixels)
 
 
-@pytest.mark.parametrize("scheme", quick_ones(RATED, "si-lf"))
+@pytest.mark.parametrize("scheme", quick_ones(RATED, "si-lf", "si-av1"))
 def test_target_rates_are_met(scheme):
     picture = large() if scheme == "ei-mpeg2" else many()  # MPEG-2 fills frames of 12×12 px up to 16×16
     coded = encode(picture, quick(scheme), bpp=1.5)

@@ -89,6 +89,7 @@ def test_the_range_of_disparity_is_found(disparity, down):
     assert high <= max(0, -256 * disparity[1]) + ranges.MARGIN
 
 
+@pytest.mark.slow
 def test_disparities_of_the_sides_are_within_the_range():
     """A plane of disparity 4 that the middle view does not show: it is flat there."""
     moved = shifted_plane((4, 4), grid=(7, 7), height=48, width=48)
@@ -288,7 +289,8 @@ def test_a_quality_is_met_by_the_measure_that_is_tuned_for(quality, tune):
     assert measure == pytest.approx(quality, abs=0.1)
 
 
-@pytest.mark.parametrize("level", first_fast([2, 0, 1, 3, 4]))
+@pytest.mark.slow
+@pytest.mark.parametrize("level", range(5))
 def test_a_level_that_ends_early_is_named(level):
     picture = shifted_plane((1, 1), grid=(9, 9))
     noise = np.random.default_rng(3).normal(0, 3, picture.pixels.shape)  # without it some levels have eight bytes

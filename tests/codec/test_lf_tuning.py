@@ -461,6 +461,7 @@ def test_sums_of_a_network_are_exact_in_float32():
     assert 255 * last.sum() < 1 << 24
 
 
+@pytest.mark.slow
 def test_a_network_guesses_what_a_photograph_lacks():
     """One on which it was not trained: with the guess the filter saves more error than without."""
     picture = IIPicture(np.ascontiguousarray(data.astronaut()[20:180, 140:300]), (160, 160), (1, 1))

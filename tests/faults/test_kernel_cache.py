@@ -126,6 +126,7 @@ def test_a_cache_that_cannot_be_written(package):
     assert called_in_a_process(package, "limited") == (42, 0)
 
 
+@pytest.mark.slow
 def test_an_edit_of_a_file_beside_it(called, package):
     """A kernel may call a kernel of another file in its folder; numba's own cache would keep the old copy."""
     (package / "old" / "twice.py").write_text(KERNEL.replace("doubled", "twice"))

@@ -254,6 +254,7 @@ def test_refused_pictures():
         estimate_depth(IIPicture(np.zeros((32, 8, 3), np.uint8), (4, 16), (2, 2)))
 
 
+@pytest.mark.slow
 def test_sums_of_the_largest_costs_fit_in_16_bits():
     """Black and white pixels at random: no label fits, every path pays for a leap."""
     pixels = 255 * np.random.default_rng(1).integers(0, 2, (60, 60, 1), np.uint8).repeat(3, axis=2)

@@ -427,6 +427,7 @@ def test_more_digits_than_a_camera_keeps_are_the_same_pitch():
         IIPicture(pixels, stated.lenses, (13.841, 13.841), stated)
 
 
+@pytest.mark.slow
 def test_deshift_is_on_the_command_line(run, refused, tmp_path):
     made = pictures.shot("twins", "hexagonal", 8).picture
     made.save(tmp_path / "h.png")

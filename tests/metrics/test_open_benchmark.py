@@ -368,7 +368,7 @@ def failing(code):
     [
         ("import sys; print('no such view'); sys.exit(3)", "ended with code 3: no such view"),
         ("import sys; sys.exit(1)", "ended with code 1: without output"),
-        ("import time; time.sleep(60)", "ran longer than 1 s"),
+        pytest.param("import time; time.sleep(60)", "ran longer than 1 s", marks=pytest.mark.slow),
         ("import os; os.abort()", "ended with code -6"),
         ("pass", "encoder wrote no file at 2 bpp"),
         ("import sys; open(sys.argv[2], 'w')", "encoder wrote no file at 2 bpp"),
@@ -522,6 +522,7 @@ def test_a_coder_that_fails_once_has_no_result(definition, picture, coder):
         run(definition, "deflate", lambda _: picture, encode=coder.encode, decode=decode)
 
 
+@pytest.mark.slow
 def test_pictures_of_other_pixels_are_reported(definition, picture, coder):
     fixed = picture_json("ramp", picture)["sha256"]
     for digest, expected in ((fixed, True), ("0" * 64, False)):
@@ -619,6 +620,7 @@ def with_points(result, name, *, rate=1.0, gain=0.0, last=True):
     return {**result, "coder": name, "pictures": [{**result["pictures"][0], "points": points}]}
 
 
+@pytest.mark.slow
 def test_ranking_by_targets_met_then_quality(tmp_path, definition, picture, coder):
     base = result_of(definition, picture, "deflate", coder)
     named = [

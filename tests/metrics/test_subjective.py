@@ -112,6 +112,7 @@ def test_a_measure_that_is_a_monotone_function_of_opinion_predicts_it():
     assert lower.plcc == pytest.approx(1) and lower.srocc == pytest.approx(-1) and math.isnan(lower.outlier_ratio)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [8, 25])
 def test_the_error_has_the_degrees_of_freedom_of_the_fit(count):
     """ITU-T P.1401: N − 4 for the logistic function; of noise of known spread, the error is that spread."""

@@ -234,7 +234,8 @@ def test_neighbours_under_another_lens_do_not_count():
     assert shot.stats.samples == {4: 128 * 64}
 
 
-@pytest.mark.parametrize("which", first_fast(["hall", "noise"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("which", ["hall", "noise"])
 def test_pixels_that_stopped_are_within_the_target(which):
     """Against 400 samples, whose own error is about a tenth of a step."""
     scene, camera = hall(), IICamera(pixels=(64, 32), lenses=(8, 4), pixel_pitch_mm=0.78, gap_mm=11.7)
