@@ -24,7 +24,7 @@ test: $(VENV)/.installed
 	$(PYTEST) -m "not slow"
 
 # the slow tests, which `test` leaves out
-test-all: $(VENV)/.installed kernels
+test-all: $(VENV)/.extras kernels
 	$(PYTEST) -m slow
 
 # each kernel is compiled once, in two processes; without this both workers of the tests compile most of them
@@ -58,8 +58,14 @@ $(VENV)/.docs: $(VENV)/.installed
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[docs]"
 	touch $@
 
+# coders to compare with and what drives a browser: tests that lack them are skipped
+$(VENV)/.extras: $(VENV)/.installed
+	for extra in anchors browser; do \
+	  $(BIN)/python -m pip install -q --disable-pip-version-check -e ".[$$extra]" || echo "no $$extra" >&2; done
+	touch $@
+
 # sources of which little or nothing is imported: compiling them would take 5 s
-UNUSED := '/(tests|fontTools|mypyc?|pip|pkg_resources|playwright|pygments|setuptools)/'
+UNUSED := '/(tests|fontTools|mypyc?|pip|pkg_resources|pygments|setuptools)/'
 $(VENV)/.installed: pyproject.toml
 	"$(PYTHON)" -c "" 2>/dev/null || { echo "no Python from 3.11 on was found: install one or type make PYTHON=..." >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
