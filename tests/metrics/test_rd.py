@@ -214,7 +214,7 @@ def test_versions_are_those_of_all_that_results_depend_on():
     """
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    files = {"all", "anchors", "arrays", "dev", "docs", "notebooks"}  # h5py reads and writes to the bit
+    files = {"all", "anchors", "arrays", "browser", "dev", "docs", "notebooks"}  # h5py reads and writes to the bit
     optional = [line for extra in set(extras) - files for line in extras[extra]]
     needed = {re.match(r"[\w-]+", line)[0] for line in [*project["dependencies"], *optional]}
     assert set(LIBRARIES) == needed - {"matplotlib", "pydantic", "typer", "rich", "dask"}
