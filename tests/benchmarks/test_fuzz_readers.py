@@ -14,12 +14,12 @@ from benchmarks.stability.fuzz_readers import __main__ as fuzz
 from benchmarks.stability.fuzz_readers import containers, seeds, trees
 from benchmarks.stability.fuzz_readers.readers import READERS
 from raytrace_ii.files.load import read_model
-from tests.support.slow import first_fast
 
 CASES = 100
 
 
-@pytest.mark.parametrize("name", first_fast(READERS, 8))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", READERS)
 def test_short_run(name, tmp_path):
     """On b1dc540 only the coders were fuzzed (benchmarks.coding.fuzz)."""
     found = {}

@@ -185,6 +185,7 @@ def test_a_picture_without_lenses_ends_in_one_line(run, refused, tmp_path):
     refused(run("calibrate", tmp_path / "n.png", "--white", tmp_path / "w.png", "-o", tmp_path / "c"), "w.png")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [1_000, 140_000])
 def test_a_full_disk_ends_in_one_line(run, frames, tmp_path, limit):
     """No file fits, or all but the picture of centres."""

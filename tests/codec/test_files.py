@@ -141,15 +141,9 @@ def test_words_keep_their_numbers():
     assert len(set(WORDS)) == len(WORDS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "scheme",
-    [
-        "si-h264:balanced",
-        "ei-hevc:best",
-        "ri-av1:best,by=columns",
-        "jpeg2000",
-        pytest.param("si-avif:best", marks=pytest.mark.slow),
-    ],
+    "scheme", ["si-h264:balanced", "ei-hevc:best", "ri-av1:best,by=columns", "jpeg2000", "si-avif:best"]
 )
 def test_usual_files_have_at_most_64_bytes_beside_the_payload(scheme, tmp_path):
     for name in ("setup1", "setup2-64", "setup3"):

@@ -87,6 +87,7 @@ def test_schemes_without_quantiser_have_a_floor_too():
     assert floor("jpeg2000", (12, 8), (4, 4)).bpp < 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [2, 4, 8, 16, 32])
 def test_fewer_frames_fewer_header_bits_just_as_predicted(side):
     """256×256 pixels: SI below EI while U·V < 256, and below RI while U < L = 256/side, that is up to 8 for both."""

@@ -170,6 +170,7 @@ def test_a_rate_is_met_over_the_take():
     assert coded.reached
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [0.0, 0.02, 0.4, 0.9, 0.999])
 def test_a_segment_that_ends_early_is_refused(part):
     video = plane(frames=3)

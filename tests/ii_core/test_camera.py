@@ -274,6 +274,7 @@ def test_places_have_bounds(name):
             IICamera(**{**GOOD, name: (value,) + (0,) * (count - 1)})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lenses", [(4, 3), (1, 1)])
 def test_lengths_within_their_bounds_give_finite_rays_and_reports(lenses):
     """Quotients of extreme lengths are finite, or refused by name."""

@@ -776,6 +776,7 @@ def test_depth_priority_blurs_by_the_aperture_at_every_depth(z):
     assert width(x, white) == pytest.approx(1.0, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("z", [22.0, 32.0, 62.0])
 def test_resolution_priority_is_sharp_at_its_image_plane_alone(z):
     image = 40.0  # from the lens plane: focused at z = 42

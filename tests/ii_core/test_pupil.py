@@ -90,6 +90,7 @@ def test_peak_of_small_aberrations_is_marechals(waves, share, spread):
     assert got / peak == pytest.approx(math.exp(-((2 * math.pi * waves * spread) ** 2) / 5), abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ring", [1e-3, 0.3])
 @pytest.mark.parametrize(("disk", "rms"), [(0.0, 1 / 4), (-8.0, 1 / 12)])
 def test_spot_of_third_order_has_the_closed_forms_radius(ring, disk, rms):

@@ -93,6 +93,7 @@ def test_smallest_rectangle_inverts_exactly(lattice, pitch, offset, lenses, pixe
     assert mask.sum() == owned.sum()  # each pixel stands in the rectangle of its one lens
 
 
+@pytest.mark.slow
 @settings(max_examples=80, deadline=None)
 @given(
     st.sampled_from(["rectangular", "hexagonal"]),

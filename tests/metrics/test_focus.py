@@ -240,6 +240,7 @@ def test_a_textured_wall_lies_in_its_layer(d, method):
     assert (error <= 1).mean() > 0.97
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["dissertation", "robust"])
 @pytest.mark.parametrize("d", [7, 40, 400])  # the dissertation's layers end at 250
 def test_default_layers_find_a_wall_near_and_far(d, method):

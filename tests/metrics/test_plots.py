@@ -218,6 +218,7 @@ CHARTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chart", CHARTS)
 def test_names_in_charts_are_drawn_letter_by_letter(chart, tmp_path):
     """A dollar sign began a formula, of which matplotlib could make no sense; a first underscore hid a name."""

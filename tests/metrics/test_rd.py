@@ -404,7 +404,8 @@ def made_up(shift=0.0):
     return records
 
 
-@pytest.mark.parametrize("suffix", [".png", pytest.param(".pdf", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", [".png", ".pdf"])
 def test_chart_comes_from_the_file_alone_and_shows_its_data(tmp_path, suffix):
     import OpenImageIO as oiio
 

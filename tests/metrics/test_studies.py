@@ -34,7 +34,6 @@ from metrics import (
 from metrics.plots.depth_chart import draw_depth_rate
 from metrics.plots.rd_chart import draw
 from metrics.plots.tables import latex_text
-from tests.support.slow import first_fast
 
 SCHEMES, RATES = ["fine", "coarse"], [3, 6, 9, 12, 15, 24]
 
@@ -184,7 +183,8 @@ def test_the_image_of_q_depth_lies_at_its_rates_and_depths(study):
     assert (low < mean).all() and (mean < high).all()
 
 
-@pytest.mark.parametrize("suffix", first_fast([".svg", ".png", ".pdf"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", [".svg", ".png", ".pdf"])
 def test_the_same_study_gives_the_same_file(study, tmp_path, suffix):
     kept = read_study(study[1])
     files = [tmp_path / f"{i}{suffix}" for i in range(3)]

@@ -91,6 +91,7 @@ def test_the_scale_is_the_fixed_point_of_hunters_algorithm():
     np.testing.assert_allclose(pair_scale(wins).scale, log - log.mean(), atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["bradley-terry", "thurstone"])
 def test_simulated_pairs_give_back_the_scale_that_went_in(model):
     """In 95 of 100 runs for each of 6 stimuli: 600 intervals, of standard error 0.9 % if they were independent."""
