@@ -228,6 +228,37 @@ def test_a_click_without_a_map_finds_where_views_agree(opened, tmp_path):
     assert found == pytest.approx([shift] * len(found), abs=(span[1] - span[0]) / 500)
 
 
+PANES = """([k, l]) => {
+  const { field, meta } = ii.viewer, [u, v] = meta.ei, [across, down] = meta.lenses.map((n, i) => n * meta.ei[i]);
+  const optics = { ...ii.viewer.optics(), second: 0 };
+  const raw = field.offscreen(across, down, (pane) => field.draw("raw", pane,
+    { ...optics, middle: [across / 2, down / 2], extent: [across, down], magnify: 1 }));
+  const epi = field.offscreen(meta.lenses[0], u, (pane) => field.draw("epi", pane,
+    { ...optics, origin: [-0.5, 0], pace: [1, 0], cursor: [k, l], rows: u }));
+  return [Array.from(raw), Array.from(epi), optics.base, optics.slope];
+}"""
+
+
+def test_lenslets_and_the_epipolar_image_are_the_pictures_pixels(opened, still, shot):
+    (k, l), (u, v) = shot.picture.lenses, shot.picture.ei_pixels
+    raw, epi, base, slope = opened(still, "#x=0.3&y=-0.2&f=0").evaluate(PANES, [5, 7])
+    pixels = shot.picture.pixels.astype(int)
+    shown = np.reshape(raw, (l * v, k * u, 4))[..., :3]
+    marked = (shown != pixels).any(axis=-1)
+    lens = np.stack(np.meshgrid(np.arange(k), np.arange(l)), axis=-1)
+    seen = np.floor(np.array(base) + np.array(slope) * lens + 0.5).astype(int) % (u, v) + lens * (u, v)
+    expected = np.zeros_like(marked)
+    expected[seen[..., 1], seen[..., 0]] = True
+    np.testing.assert_array_equal(marked, expected)
+    np.testing.assert_allclose(shown[marked], np.full((k * l, 3), (255, 204, 51)), atol=1)
+    row = pixels.reshape(l, v, k, u, 3)[7, int(np.floor(base[1] + slope[1] * 7 + 0.5))].transpose(1, 0, 2)
+    place, beside = np.arange(u)[:, None], np.arange(k) - 5
+    view = base[0] + slope[0] * np.arange(k)
+    bare = (abs(place - view) >= abs(slope[0]) + 1) & (abs(beside) >= 1)  # of the view's line, and that of the focus
+    assert bare.mean() > 0.4
+    np.testing.assert_array_equal(np.reshape(epi, (u, k, 4))[..., :3][bare], row[bare])
+
+
 def test_comparison_shows_the_difference(opened, compared, shot, brighter):
     tab = opened(compared)
     assert tab.evaluate("ii.viewer.state.mode") == "split"
