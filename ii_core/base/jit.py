@@ -1,8 +1,8 @@
 """Compilation of kernels: lazy, cached on disk, without the interpreter lock.
 
 A cached kernel is valid as long as no source file of its folder changes, nor of the folders of kernels that its file
-imports, nor this file and the table of sRGB: the machine code of a kernel contains that of the kernels it calls. The
-cache of numba alone notices changes in a kernel's own file only.
+imports, nor this file, the one of references and the table of sRGB: the machine code of a kernel contains that of the
+kernels it calls. The cache of numba alone notices changes in a kernel's own file only.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
-from numba import types
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic, overload
+
+from .references import taken
 
 
 class Cache(FunctionCache):
@@ -66,7 +67,7 @@ def _stamp(function: Callable[..., Any]) -> str:
         here = Path(__file__)
         sources = [
             here,
-            here.with_name("colour.py"),
+            *map(here.with_name, ("colour.py", "references.py")),
             *(source for folder in folders for source in folder.glob("*.py")),
         ]
         _STAMPS[file] = hashlib.sha256(b"".join(sorted(map(_source, sources)))).hexdigest()
@@ -89,7 +90,7 @@ def _source(file: Path) -> bytes:
 
 
 # A kernel that does not state these has those of the kernel that happens to call it first.
-_STATED: dict[str, Any] = {"fastmath": False, "forceinline": False, "error_model": "python"}
+_STATED: dict[str, Any] = dict(fastmath=False, forceinline=False, error_model="python", no_cfunc_wrapper=True)
 
 
 def kernel(function: Callable[..., Any], **options: Any) -> Any:
@@ -284,21 +285,16 @@ class _LanePartCompiler(_PartCompiler):
 
 
 def _part(function: Callable[..., Any], compiler: type[_PartCompiler] = _PartCompiler, **options: Any) -> Any:
-    flags: dict[str, Any] = {**_STATED, "_nrt": False, "error_model": "numpy", **options}
-    flags |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    flags = {**_STATED, "_nrt": False, "no_cpython_wrapper": True, "error_model": "numpy", **options}
     compiled: Any = numba.njit(nogil=True, pipeline_class=compiler, **flags)(function)
     compiled.add_overload = lambda result: _keep(compiled, result)
     compiled._compile_for_args = lambda *_, **__: function
-    compiled.get_call_template = lambda arguments, keywords: _call_without_literals(compiled, arguments, keywords)
-    return compiled
-
-
-def _call_without_literals(compiled: Any, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
-    """Resolve a call of a part: a number written in the call would compile a part of its own."""
-    plain = tuple(types.unliteral(kind) for kind in arguments)
-    return Dispatcher.get_call_template(
-        compiled, plain, {name: types.unliteral(kind) for name, kind in keywords.items()}
+    compiled.get_call_template = lambda arguments, keywords: Dispatcher.get_call_template(
+        compiled,
+        tuple(taken(kind) for kind in arguments),
+        {name: taken(kind) for name, kind in keywords.items()},
     )
+    return compiled
 
 
 def late_kernel(function: Callable[..., Any]) -> Any:
@@ -306,12 +302,12 @@ def late_kernel(function: Callable[..., Any]) -> Any:
 
     Returns nothing, as C function. Its callers neither contain it nor optimise it a second time.
     """
-    return _late(lean_kernel(function, no_cpython_wrapper=True))
+    return _late(lean_kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=False))
 
 
 def late_lane_kernel(function: Callable[..., Any]) -> Any:
     """Compile a late kernel whose loops over lanes become vectors, as those of a `lane_kernel`."""
-    return _late(lean_kernel(function, no_cpython_wrapper=True, pipeline_class=_LaneCompiler))
+    return _late(lean_kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=False, pipeline_class=_LaneCompiler))
 
 
 def _late(compiled: Any) -> Any:

@@ -6,7 +6,7 @@ import pytest
 from ii_core.display.viewer import write_viewer
 from metrics import quality_rows
 from tests.support import pictures
-from tests.support.one_tab import one_tab
+from tests.support.browser import one_tab
 
 LABELS = ("original", "si-h264, 0.100 bpp, 30.32 dB")
 

@@ -8,8 +8,10 @@ import sys
 import threading
 import tomllib
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numba
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -18,6 +20,7 @@ from numba.core import event
 from ii_core.base import jit
 from ii_core.base.extras import EXTRAS
 from ii_core.base.parallel import cores, over_rows
+from ii_core.base.references import Reference, by_reference
 
 ROOT = Path(__file__).parents[2]
 WITHOUT = f"""
@@ -135,6 +138,49 @@ def test_a_kernel_keeps_its_rounding_and_its_size_whoever_calls_it():
     assert jit.lean_kernel(first)(1 + 2**-30, 1 - 2**-30, -1.0) == 0
     (compiled,) = part.overloads.values()
     assert not compiled.fndesc.inline
+
+
+@by_reference
+class Inner(NamedTuple):
+    numbers: Any
+    factor: Any
+    some: Any
+
+
+@by_reference
+class Outer(NamedTuple):
+    inner: Any
+    rows: Any
+
+
+def test_a_part_reads_each_tuple_that_it_gets_by_reference():
+    """New tuples in each round stand in the same place of the stack; what is written to arrays is read anew."""
+
+    @jit.part_kernel
+    def add(outer, k):
+        inner = outer.inner
+        outer.rows[1, k] += inner.numbers[k] * inner.factor if inner.some else -1
+        inner.numbers[k] += 1
+        return inner.numbers[k] + outer.inner.factor
+
+    def sums(outer):
+        total = 0.0
+        for i in range(3):
+            inner = Inner(outer.inner.numbers, outer.inner.factor + i, i != 1)
+            for k in range(4):
+                total += add(Outer(inner, outer.rows), k)
+        return total
+
+    def run(function):
+        outer = Outer(Inner(np.arange(4, dtype=np.int16), 0.5, True), np.zeros((2, 4)))
+        return function(outer), outer.rows.tolist(), outer.inner.numbers.tolist()
+
+    total, rows, numbers = run(jit.lean_kernel(sums))
+    assert (total, rows, numbers) == run(sums)
+    assert (total, numbers) == (60.0, [3, 4, 5, 6])
+    assert rows == [[0] * 4, [4.0, 7.0, 10.0, 13.0]]
+    (arguments,) = add.overloads
+    assert isinstance(arguments[0], Reference)
 
 
 @pytest.mark.parametrize("before", [(700, 10, 10), (0, 10, 10), (100_000, 5, 5)])

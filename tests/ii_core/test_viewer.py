@@ -16,7 +16,7 @@ from ii_core.display.viewer import page, write_viewer, write_viewer_folder
 from ii_core.display.viewer.page import depth_view
 from metrics import quality_rows
 from tests.support import pictures
-from tests.support.one_tab import served, with_script
+from tests.support.browser import served, with_script
 
 
 def snapshot(tab, **state):

@@ -7,7 +7,7 @@ from codec import encode
 from ii_core import IICamera, IIPicture
 from ii_core.display.viewer import write_viewer
 from tests.ii_core.conftest import LABELS
-from tests.support.one_tab import with_script
+from tests.support.browser import with_script
 
 pytestmark = pytest.mark.slow  # the page itself is in `test_viewer.py`
 

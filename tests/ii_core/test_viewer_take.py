@@ -17,7 +17,7 @@ from ii_core import video_of, view_image
 from ii_core.display.viewer import page, write_viewer, write_viewer_folder
 from ii_core.video.video import IIVideo
 from tests.ii_core.test_viewer import snapshot
-from tests.support.one_tab import served
+from tests.support.browser import served
 
 pytestmark = pytest.mark.slow  # the page itself is in `test_viewer.py`
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.support.one_tab import one_tab
+from tests.support.browser import one_tab
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ from metrics.observers.results import sealed
 from metrics.observers.simulated import write_simulated
 from metrics.observers.store import ResultFolder
 from raytrace_ii.cli.server import Answers, PageServer
-from tests.support import one_tab
+from tests.support import browser as browsers
 
 SCENES = {"apples": 5, "car": 3, "cuboid": 4}
 
@@ -514,7 +514,7 @@ def test_the_command_serves_the_test_and_keeps_results(run, monkeypatch, coded, 
         assert post(f"{url}results") == (200, {"observer": 1})
         assert (tmp_path / "r" / "observer-001.jsonl").read_bytes() == b""
 
-    code, out, err = one_tab.served(monkeypatch, run, words, visit)
+    code, out, err = browsers.served(monkeypatch, run, words, visit)
     assert code == 0 and "answers go to" in out.splitlines()[0], err
 
 

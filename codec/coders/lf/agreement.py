@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ii_core.base.jit import lane_part, lane_stage, part_kernel, stage_kernel
+from ii_core.base.references import by_reference
 
 from .kinds import DIFFERENT
 from .state import UNKNOWN, zeros
@@ -99,6 +100,7 @@ def _difference(views, sources, y, x, d, values):
     return _least(values, seen, count)
 
 
+@by_reference
 class Matching(NamedTuple):
     """Memory for a comparison of sources.
 

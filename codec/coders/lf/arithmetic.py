@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel
+from ii_core.base.references import by_reference
 
 from .contexts import ELEMENT_OF, ELEMENT_WEIGHTS, HISTORY, PLACE_OF, RECENT
 
@@ -43,6 +44,7 @@ SQUASHED = np.rint(ONE / (1 + np.exp(-np.arange(-FARTHEST, FARTHEST + 1) / 256))
 SQUASHED = np.clip(SQUASHED, LEAST, ONE - LEAST)
 
 
+@by_reference
 class Arithmetic(NamedTuple):
     """State of a coder: contexts (C, 3), registers and bytes."""
 

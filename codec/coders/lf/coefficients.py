@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ii_core.base.jit import fused, part_kernel, stage_kernel
+from ii_core.base.references import by_reference
 
 from .arithmetic import REFINED, bit_cost, code_bit, code_mixed, code_number, code_of_four, code_raw, number_cost
 from .contexts import (
@@ -308,6 +309,7 @@ def quantise(costs, coefficients, plane, shape, step, weight, levels, finer):
     return bits, error
 
 
+@by_reference
 class Trellis(NamedTuple):
     """Memory of `quantise_dependent`: the best path to each state."""
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ii_core.base.jit import array_kernel, lean_kernel, part_kernel
+from ii_core.base.references import by_reference
 
 from . import contexts as at
 from .arithmetic import DECODING, code_bit, code_number, code_raw
@@ -25,6 +26,7 @@ MOST_WEIGHT = 1 << 20
 MOST_MISSED = 1 << 20
 
 
+@by_reference
 class Exact(NamedTuple):
     """State of the lossless coding of a view.
 

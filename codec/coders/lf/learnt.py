@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ii_core.base.jit import lane_kernel, lane_part, lane_stage
+from ii_core.base.references import by_reference
 
 from .state import CODED, TALL, WIDE
 from .warp import clamped
@@ -29,6 +30,7 @@ UNIT = 64  # of an input: 1 is a step, or true
 SIZES = CHANNELS * INPUTS, 9 * LAYERS * CHANNELS**2, 9 * CHANNELS, (LAYERS + 1) * CHANNELS  # of arrays of weights
 
 
+@by_reference
 class Net(NamedTuple):
     """Weights: of the first layer and those between in 2^-8, of the last one in 2^-14."""
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ii_core.base.jit import lane_kernel, lane_part, lane_stage, lean_kernel, part_kernel
+from ii_core.base.references import by_reference
 
 from . import contexts as at
 from .arithmetic import code_bit, code_number, code_raw
@@ -34,6 +35,7 @@ BIN_SHIFT = 3
 ONE, TWO, THREE, FOUR = (np.uint64(i) for i in range(1, 5))
 
 
+@by_reference
 class Filters(NamedTuple):
     """Filters of all views.
 

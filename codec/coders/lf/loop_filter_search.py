@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core.base.jit import lane_kernel, lane_part, lane_stage
+from ii_core.base.references import by_reference
 
 from . import contexts as at
 from .arithmetic import Arithmetic, bit_costs
@@ -31,6 +32,7 @@ GROUP = 128  # samples of a class whose products are added at once
 exact_sums = partial(lane_stage, fastmath={"reassoc"})  # of whole numbers below 2^53: the same in any order
 
 
+@by_reference
 class Moments(NamedTuple):
     """Sums over a decoded view, by plane and class.
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel
+from ii_core.base.references import by_reference
 
 from .kinds import from_where, guesses, kind_cost, mask_cost, seen_mask
 from .state import EXPLICIT, MOST_REFERENCES, UNKNOWN
@@ -29,6 +30,7 @@ OTHERS, AROUND = 4, 8
 WORSE, MORE_BITS = np.float32(1.5), np.float32(4)
 
 
+@by_reference
 class Match(NamedTuple):
     """Memory of the search of disparities.
 

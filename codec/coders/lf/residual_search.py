@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ii_core.base.jit import part_kernel, stage_kernel
+from ii_core.base.references import by_reference
 
 from . import motion
 from .arithmetic import bit_cost
@@ -33,6 +34,7 @@ BEYOND = np.float32(1.00001)  # times the least cost so far: more by far than su
 WORTH_SKIPPING = np.float32(1.2)  # times the least cost so far: beyond it, skipping the transform is not tried
 
 
+@by_reference
 class Kept(NamedTuple):
     """The best blocks found in a region so far, by the binary logarithm of its area."""
 
@@ -42,6 +44,7 @@ class Kept(NamedTuple):
     motions: Any
 
 
+@by_reference
 class Trial(NamedTuple):
     """Memory of the search."""
 

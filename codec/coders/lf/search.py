@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core.base.jit import array_kernel, part_kernel, stage_kernel
+from ii_core.base.references import by_reference
 
 from .arithmetic import bit_cost
 from .blocks import (
@@ -52,6 +53,7 @@ MANY_SPLIT = 4  # quarters that are divided themselves: then halves are not trie
 FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
 
+@by_reference
 class Search(NamedTuple):
     """State of the encoder beside the job.
 

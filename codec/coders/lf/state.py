@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core.base.jit import part_kernel, stage_kernel
+from ii_core.base.references import by_reference
 
 from . import motion
 from .transform import LARGEST, sides
@@ -26,6 +27,7 @@ KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, CROSS_1, CROSS_2, SKIPPED, TALL,
 FOLLOWS, FIELDS = 13, 14
 
 
+@by_reference
 class Job(NamedTuple):
     """A view to be coded or decoded.
 
@@ -101,6 +103,7 @@ class Job(NamedTuple):
     guided: Any = 0
 
 
+@by_reference
 class Work(NamedTuple):
     """Memory for one block."""
 
