@@ -1,7 +1,7 @@
 """Named tuples that parts of kernels take by reference: one address in place of the numbers of every array.
 
 Numba passes a named tuple as all of its numbers, some 150 for twenty arrays, and copies them all to read one. By
-reference, `si-lf` is compiled in seven eighths of the time and codes in nine tenths.
+reference, `si-lf` is compiled in 85 % of the time and encodes in 92 %.
 """
 
 from __future__ import annotations

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ii_core.base.jit import lane_kernel, lane_part, lane_stage, lean_kernel, part_kernel, stage_kernel
-from ii_core.base.references import by_reference
 
 from .agreement import MATCHED, TRUNCATED, disagreement, forget, hashed, mismatch, prepare, reach, widen
 from .state import EXPLICIT, INDEX, KIND, UNKNOWN, zeros
@@ -39,7 +38,6 @@ OUTLYING = _falling(64, 6.0)  # by sum of three differences in 16 eighths of a c
 PHASE = np.rint(4096 * np.exp(-np.arange(65) / 64 / (2 * 0.2**2))).astype(np.int32)
 
 
-@by_reference
 class Synthesis(NamedTuple):
     """A view made of others.
 
