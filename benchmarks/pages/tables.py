@@ -14,6 +14,7 @@ import re
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from textwrap import wrap
 
 from benchmarks.records import ROOT
 from benchmarks.registry import BENCHMARKS
@@ -21,6 +22,7 @@ from ii_core.base.files import atomic_path
 
 Tables = Mapping[tuple[str, str], list[str]]
 OWNERS = tuple(benchmark.tables for benchmark in BENCHMARKS.values() if benchmark.tables)
+COLUMNS = 100  # of text on pages
 MARK = re.compile(r"^<!-- ([a-z][\w-]*) -->$", re.M)
 
 
@@ -54,7 +56,7 @@ def publish(tables: Tables, root: Path = ROOT) -> None:
 
 
 def filled(text: str, mark: str, lines: list[str]) -> str:
-    """Return the text with these lines between ``<!-- mark -->`` and ``<!-- /mark -->``.
+    """Return the text with these lines, sentences wrapped, between ``<!-- mark -->`` and ``<!-- /mark -->``.
 
     Raises
     ------
@@ -65,7 +67,13 @@ def filled(text: str, mark: str, lines: list[str]) -> str:
     if begin not in text or end not in text:
         raise ValueError(f"the page has no {begin.strip()} … {end}")
     before, after = text.index(begin) + len(begin), text.index(end)
-    return "\n".join([text[:before], *lines, "", text[after:]])
+    wrapped = [part for line in lines for part in ([line] if line.startswith(("|", "!", "#")) else _wrapped(line))]
+    return "\n".join([text[:before], *wrapped, "", text[after:]])
+
+
+def _wrapped(line: str) -> list[str]:
+    indent = "  " if line.startswith("- ") else ""
+    return wrap(line, COLUMNS, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) or [line]
 
 
 def fill(path: Path, mark: str, lines: list[str]) -> None:

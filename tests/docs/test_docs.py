@@ -188,6 +188,13 @@ def test_the_first_pages_are_short(page, most):
     assert len(PAGES[page].split()) <= most
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_text_is_wrapped_at_100_columns(page):
+    """But for tables, headings and pictures, which are lines of their own."""
+    text = re.sub(r"^    .*$", "", FENCED.sub("", PAGES[page]), flags=re.M)
+    assert [line for line in text.split("\n") if len(line) > 100 and not re.match(r" *[|#<]|!\[", line)] == []
+
+
 # -- pages of cameras: every key, element and camera, and the numbers of the worked display
 
 
