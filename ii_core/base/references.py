@@ -1,7 +1,7 @@
 """Named tuples that parts of kernels take by reference: one address in place of the numbers of every array.
 
-Numba passes a named tuple as all of its numbers, some 150 for twenty arrays, and copies them all to read one. By
-reference, `si-lf` is compiled in 85 % of the time and encodes in 92 %.
+Numba passes a named tuple as all of its numbers, some 150 for twenty arrays, and copies them all to read one. What
+references save is in docs/decisions/house.md (2026-11-29).
 """
 
 from __future__ import annotations
@@ -77,7 +77,11 @@ def _constant(module: Any) -> Any:
 
 @lower_cast(types.NamedTuple, Reference)
 def _refer(context: Any, builder: Any, given: Any, _: Any, value: Any) -> Any:
-    """Store a named tuple on the stack; assembly, a riddle to LLVM, parts writing from use."""
+    """Store a named tuple on the stack, and return its address.
+
+    An empty instruction of assembly passes the address on, so that LLVM does not see what it leads to: the place is
+    written before, and constant after.
+    """
     data = context.data_model_manager[given].as_data(builder, value)
     place = cgutils.alloca_once(builder, data.type)  # not within a loop
     builder.store(data, place)
