@@ -21,6 +21,7 @@ from scipy.optimize import minimize
 from ii_core import IIPicture, estimate_depth
 from ii_core.base.colour import srgb
 from ii_core.depth import estimate
+from ii_core.depth.highlights import highlights
 
 SURE, BORDER, EVERY = 0.9, 8, 5  # of the pixels, every fifth is fitted
 SIGNS = (-1, -1, -1, 1), (-1, -1, 1, -1)  # of the terms of `agreement` and `rivalry`
@@ -155,24 +156,27 @@ def skin(draw: np.random.Generator) -> Callable[[Array], tuple[Array, float, flo
     return lambda point: (np.clip(ground + np.sin(point @ waves.T + turns) @ colours, 0, 1), gloss, sharpness)
 
 
-Terms = tuple[tuple[Array, Array], Array, Array]
+Terms = tuple[tuple[Array, Array], Array, Array, Array]
 
 
 def terms(picture: IIPicture, true: Array) -> Terms:
-    """Return the terms of both judges (H, W, n), the pixels that count, and of these, which are within 0.07 px."""
+    """Return the terms of both judges (H, W, n) and the pixels that count; of these, which are within 0.07 px, and
+    the factor of highlights.
+    """
     kept: list[Any] = []
 
-    def judged(disparity: Array, ratio: Array, margin: Array, quarters: estimate.Quarters) -> Array:
+    def judged(disparity: Array, ratio: Array, margin: Array, quarters: estimate.Quarters, mean: Array) -> Array:
         known = np.nan_to_num(disparity)
         both = estimate.agreement(quarters), estimate.rivalry(known, ratio, margin, quarters)
         kept.extend(np.stack([np.ones_like(known), *found], axis=-1) for found in both)
+        kept.append(np.where(highlights(mean), estimate.SHINY, 1))
         return np.zeros_like(known)
 
     with patch.object(estimate, "judged", judged):
         disparity = estimate_depth(picture).disparity
     inner = np.isfinite(true) & np.isfinite(disparity)
     inner[:BORDER], inner[-BORDER:], inner[:, :BORDER], inner[:, -BORDER:] = False, False, False, False
-    return (kept[0], kept[1]), inner, (np.abs(disparity - true) <= 0.07)[inner]
+    return (kept[0], kept[1]), inner, (np.abs(disparity - true) <= 0.07)[inner], kept[2][inner]
 
 
 def fitted(fields: list[Terms]) -> tuple[list[Array], Array]:
@@ -205,7 +209,7 @@ def fitted(fields: list[Terms]) -> tuple[list[Array], Array]:
 
 def confidence(each: Terms, judges: list[Array], crowd: Array) -> Array:
     """Return the confidence of the pixels that count."""
-    return _logistic(_crowd(each, judges)[each[1]] @ crowd)
+    return np.asarray(_logistic(_crowd(each, judges)[each[1]] @ crowd) * each[3])
 
 
 def _crowd(each: Terms, judges: list[Array]) -> Array:

@@ -21,6 +21,7 @@ from . import disparity_kernels as kernels
 from .around import CODES, DIRECTIONS, halved, views_around
 from .disparity_kernels import Views
 from .focus_kernels import choose, pass_on
+from .highlights import highlights
 from .layers import FARTHEST, first_mm
 
 ndimage = Lazy("scipy.ndimage")
@@ -60,6 +61,7 @@ AT_ODDS, BY_NOISE, SUDDEN = 0.003, 4.0, 8
 APART, AROUND = 0.45, 63
 JUDGES = (7.5, -0.62, -1.01, -0.65, 1.18), (-4.68, -0.55, -2.36, 0.69, -0.29)
 CROWD = -2.17, 0.63, 4.11
+SHINY = 0.5  # times the confidence where `highlights` are found: they move like surfaces behind the true one
 LOUD = 2 * OCCLUDED  # noise in codes from which no pixel is sure: all views then count as occluded
 # Even blocks from which noise is estimated: side in px, and their share.
 BLOCK, EVEN = 8, 0.1
@@ -171,7 +173,7 @@ def estimate_depth(
     disparity = thinned(disparity)
     told(3 + STEPS, total, "confidence")
     disparity[np.isnan(start) | blocked(picture, at)] = np.nan
-    confidence = judged(disparity, ratio, margin, quarters) / (1 + (noise / LOUD) ** SUDDEN)
+    confidence = judged(disparity, ratio, margin, quarters, evidence.mean) / (1 + (noise / LOUD) ** SUDDEN)
     depth = None if picture.camera is None else depth_of_disparity(picture.camera, disparity)
     told(total, total, "")
     return DepthEstimate(disparity, confidence, depth, at)
@@ -341,12 +343,12 @@ def matched(views: Views, labels: Map, workers: int | None) -> tuple[Map, Map, M
     return np.asarray(ndimage.median_filter(labelled(total, labels), 3)), ratio, margin / CODES
 
 
-def judged(disparity: Map, ratio: Map, margin: Map, quarters: Quarters) -> Map:
+def judged(disparity: Map, ratio: Map, margin: Map, quarters: Quarters, mean: Map) -> Map:
     """Return the estimated probability that disparities are within 0.07 px."""
     known = np.nan_to_num(disparity)
     terms = agreement(quarters), rivalry(known, ratio, margin, quarters)
     both = _logistic(JUDGES[0], terms[0]) * _logistic(JUDGES[1], terms[1])
-    right = _logistic(CROWD, crowd(both))
+    right = _logistic(CROWD, crowd(both)) * np.where(highlights(mean), SHINY, 1)
     return np.where(np.isnan(disparity), 0, right).astype(np.float32)
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy import ndimage
 
 from ii_core import IICamera, IIPicture, depth_of_disparity, estimate_depth
+from ii_core.base.colour import srgb
 from ii_core.camera.optics import Lens
 from ii_core.depth.all_views import disparity_of_views
 from ii_core.depth.around import half_lines, views_around
@@ -24,6 +25,7 @@ from ii_core.depth.estimate import (
     refined,
     spaced,
 )
+from ii_core.depth.highlights import highlights
 from ii_core.depth.points import view_points
 from ii_core.picture.assumed import with_assumed_camera
 from tests.support.slow import first_fast
@@ -121,6 +123,41 @@ def test_range_is_found_and_confidence_is_honest():
     found = estimate_depth(picture)
     sure = found.confidence >= 0.9
     assert sure.mean() > 0.4 and (np.abs(found.disparity - truth)[sure] > 0.07).mean() <= 0.02
+
+
+def lit(colour, gloss=0.0, stripes=(0.0, 0.0, 0.0)):
+    """View of a lit wall that bends, (3, 96, 96) in 16-bit codes, noise of a code: a highlight in the middle."""
+    y, x = np.mgrid[:96, :96] - 47.5
+    shade, print_ = 0.7 + 0.2 * np.sin(x / 9), 0.3 * (1 + np.sin((x + y) / 2))
+    wall = np.array(colour)[:, None, None] + np.array(stripes)[:, None, None] * print_
+    light = wall * shade + gloss * np.exp(-(x**2 + y**2) / 8**2)
+    return (65535 * srgb(light) + 257 * np.random.default_rng(0).normal(size=light.shape)).astype(np.float32)
+
+
+RED, PALE, GREY = (0.5, 0.06, 0.02), (0.3, 0.25, 0.05), (0.2, 0.2, 0.2)
+
+
+def test_highlights_are_found_on_coloured_surfaces_alone():
+    """Shading changes along the colour, print in other directions or hardly whiter; on grey nothing parts them."""
+    found = highlights(lit(RED, gloss=0.3))
+    away = np.hypot(*(np.mgrid[:96, :96] - 47.5))
+    assert found[away < 12].all() and not found[away > 32].any()
+    printed = lit(RED, stripes=RED), lit(RED, stripes=(0, 0.3, 0.3)), lit(PALE, stripes=(0.3, 0.25, 0.09))
+    for view in (lit(RED), *printed, lit(GREY), lit(GREY, gloss=0.3), np.zeros((3, 96, 96), np.float32)):
+        assert not highlights(view).any()
+
+
+def test_confidence_is_low_at_highlights():
+    """A highlight lies at the disparity of a lamp's image, 1 px from the wall's, and views agree on it."""
+    confident = []
+    for colour in (RED, GREY):
+        seen = np.empty((40, 9, 48, 9, 3))
+        for j, i in np.ndindex(9, 9):
+            y, x = np.mgrid[:40, :48] - np.array([20 - 0.5 * (j - 4), 24 - 0.5 * (i - 4)])[:, None, None]
+            seen[:, j, :, i] = srgb(np.array(colour) + 0.4 * np.exp(-(x**2 + y**2) / 6**2)[..., None])
+        picture = IIPicture(np.rint(255 * seen).astype(np.uint8).reshape(360, 432, 3), (48, 40), (9, 9))
+        confident.append(estimate_depth(picture, low=-3, high=3).confidence.max())
+    assert confident[0] <= 0.5 < 0.6 < confident[1], confident
 
 
 @pytest.mark.slow

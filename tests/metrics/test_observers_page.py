@@ -13,12 +13,28 @@ from ii_core.picture.view import five_viewpoints
 from metrics.observers import Options, Stimulus, read_results, write_test
 from metrics.observers.store import ResultFolder
 from raytrace_ii.cli.server import Answers, PageServer
-from tests.support.browser import true_of
+from tests.support.browser import one_tab, true_of
 
 pytestmark = pytest.mark.slow
 
 CAMERA = preset("setup1", scale=32)
 QUICK = {"seconds": 0.05, "grey_seconds": 0.0, "training": 1, "block": 2, "frames": 3, "observers": 2}
+
+
+@pytest.fixture(scope="session")
+def tab_of_all(browser):
+    yield from one_tab(browser, width=1000, height=700)
+
+
+@pytest.fixture
+def opened(tab_of_all):
+    """Open a page in the tab of all tests, without answers of earlier ones; errors of the page fail the test."""
+    yield tab_of_all.open
+    if tab_of_all.shown:
+        tab_of_all.page.evaluate("localStorage.clear()")
+        tab_of_all.page.goto("about:blank")
+        tab_of_all.shown = None
+    tab_of_all.check()
 
 
 def noise(seed):
