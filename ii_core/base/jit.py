@@ -19,11 +19,13 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
+from numba import types
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.dispatcher import Dispatcher
+from numba.core.typing import templates
 from numba.extending import intrinsic, overload
 
 from .references import taken
@@ -189,6 +191,18 @@ def _multiply_add_code(typing: Any, a: Any, b: Any, c: Any) -> Any:
 
 
 _multiply_add: Any = intrinsic(_multiply_add_code)
+
+
+def compiled_by(typing: Any) -> Any:
+    """Have kernels take the code of an intrinsic in place of a function, whose source Python runs."""
+
+    def replaced(function: Any) -> Any:
+        template = templates.make_intrinsic_template(function, typing, function.__name__)
+        templates.infer(template)
+        templates.infer_global(function, types.Function(template))
+        return function
+
+    return replaced
 
 
 class _RareCollection(event.Listener):

@@ -6,8 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from llvmlite import ir
+from numba import types
 
-from ..base.jit import array_kernel, lean_kernel, stage_kernel
+from ..base.jit import array_kernel, compiled_by, lean_kernel, stage_kernel
 
 UNSEEN = 0.6  # of the cost of another surface
 
@@ -20,15 +22,51 @@ class Views(NamedTuple):
     lines: Any  # (n,) half-line of each view, −1 for none
 
 
+_HALF, _ONE, _THREE_HALVES, _TWO = np.float32(0.5), np.float32(1.0), np.float32(1.5), np.float32(2.0)
+_FIVE_HALVES = np.float32(2.5)
+
+
 @stage_kernel
 def _cubic(f):
     """Return the weights of four samples around a place f beyond the second (Catmull–Rom), float32."""
     return (
-        np.float32(f * (-0.5 + f * (1.0 - 0.5 * f))),
-        np.float32(1.0 + f * f * (-2.5 + 1.5 * f)),
-        np.float32(f * (0.5 + f * (2.0 - 1.5 * f))),
-        np.float32(f * f * (-0.5 + 0.5 * f)),
+        f * (f * (_ONE - _HALF * f) - _HALF),
+        f * f * (_THREE_HALVES * f - _FIVE_HALVES) + _ONE,
+        f * (f * (_TWO - _THREE_HALVES * f) + _HALF),
+        f * f * (_HALF * f - _HALF),
     )
+
+
+def _sample_4x4(typing: Any, pixels: Any, at: Any, row: Any, down: Any, across: Any) -> Any:
+    """Rows of four samples are vectors: LLVM makes none of them from single samples."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        four, codes, lane = ir.VectorType(ir.FloatType(), 4), ir.VectorType(ir.IntType(16), 4), ir.IntType(32)
+        data, place = context.make_array(pixels)(context, builder, values[0]).data, values[1]
+        total = ir.Constant(four, [0.0] * 4)
+        for k in range(4):
+            samples = builder.load(builder.bitcast(builder.gep(data, [place]), codes.as_pointer()), align=2)
+            weight = builder.insert_element(
+                ir.Constant(four, ir.Undefined), builder.extract_value(values[3], k), lane(0)
+            )
+            weight = builder.shuffle_vector(weight, weight, ir.Constant(ir.VectorType(lane, 4), [0] * 4))
+            product = builder.fmul(weight, builder.uitofp(samples, four), flags=("contract",))
+            total, place = builder.fadd(total, product, flags=("contract",)), builder.add(place, values[2])
+        terms = [
+            builder.fmul(builder.extract_element(total, lane(k)), builder.extract_value(values[4], k))
+            for k in range(4)
+        ]
+        return builder.fadd(builder.fadd(terms[0], terms[1]), builder.fadd(terms[2], terms[3]))
+
+    return types.float32(pixels, types.uint64, types.uint64, down, across), generate
+
+
+@compiled_by(_sample_4x4)
+def sample_4x4(pixels: Any, at: Any, row: Any, down: Any, across: Any) -> Any:
+    """Return the weighted sum of 4×4 samples, from ``pixels[at]`` on in rows that are ``row`` apart."""
+    corners = [int(at) + k * int(row) for k in range(4)]
+    samples = np.array([pixels[c : c + 4] for c in corners], np.float32)
+    return np.float32(np.array(down) @ samples @ np.array(across))
 
 
 @array_kernel
@@ -160,16 +198,21 @@ def _in_order(low, high):
         high[x] = a if b < a else b
 
 
-@lean_kernel
+@array_kernel
 def add_evidence(views, disparity, limit, smooth, here, push, weight, mean, first, last):
     """Add up a Gauss–Newton step by quarters of views: d + Σpush/Σweight is a pixel's least-squares disparity.
 
     A view's weight is 1/(1 + r²/limit²)², r² its squared difference, ``smooth`` (3, H, W) the image of the gradients.
     Where ``here`` is set, ``push`` and ``weight`` (4, H, W) are filled, and ``mean`` (3, H, W), the weighted mean of
-    all views at the disparity. Diagonals bound the quarters.
+    all views at the disparity. Diagonals bound the quarters. A row goes through one view after the other: rows of one
+    view stay in the first cache, those of all do not.
     """
     height, width = disparity.shape
-    own = views.pixels[0]
+    own, pixels = views.pixels[0], views.pixels.reshape(-1)
+    colours = np.zeros((3, width), np.float32)
+    across, down = np.zeros((3, width), np.float32), np.zeros((3, width), np.float32)  # slopes of colours
+    moved, mass = np.empty((3, width), np.float32), np.empty(width, np.float32)  # differences and weights, added up
+    parts = np.empty((3, width), np.float32), np.empty(width, np.float32)  # those of a view
     for y in range(first, last):
         for x in range(width):
             if here[y, x]:
@@ -178,54 +221,68 @@ def add_evidence(views, disparity, limit, smooth, here, push, weight, mean, firs
                     mean[c, y, x] = own[c, y, x]
         if y < 1 or y > height - 2:
             continue
+        for c in range(3):
+            for x in range(1, width - 1):
+                colours[c, x] = own[c, y, x]
+                down[c, x] = _HALF * (smooth[c, y + 1, x] - smooth[c, y - 1, x])
+                across[c, x] = _HALF * (smooth[c, y, x + 1] - smooth[c, y, x - 1])
+        moved[:], mass[:] = 0.0, 1.0
+        for n in range(1, views.steps.shape[0]):
+            a, b = views.steps[n, 0], views.steps[n, 1]
+            q = (2 if a + b > 0.0 or (a + b == 0.0 and a > 0.0) else 0) + (
+                1 if a - b > 0.0 or (a - b == 0.0 and a > 0.0) else 0
+            )
+            _differences(pixels, n, height, a, b, y, disparity[y], here[y], colours, *parts)
+            _weigh(limit, a, b, down, across, *parts, push[q, y], weight[q, y], moved, mass)
         for x in range(1, width - 1):
-            if not here[y, x]:
-                continue
-            gx0 = np.float32(0.5) * (smooth[0, y, x + 1] - smooth[0, y, x - 1])
-            gx1 = np.float32(0.5) * (smooth[1, y, x + 1] - smooth[1, y, x - 1])
-            gx2 = np.float32(0.5) * (smooth[2, y, x + 1] - smooth[2, y, x - 1])
-            gy0 = np.float32(0.5) * (smooth[0, y + 1, x] - smooth[0, y - 1, x])
-            gy1 = np.float32(0.5) * (smooth[1, y + 1, x] - smooth[1, y - 1, x])
-            gy2 = np.float32(0.5) * (smooth[2, y + 1, x] - smooth[2, y - 1, x])
-            o0, o1, o2 = np.float32(own[0, y, x]), np.float32(own[1, y, x]), np.float32(own[2, y, x])
-            m0, m1, m2, mass = np.float32(0.0), np.float32(0.0), np.float32(0.0), np.float32(1.0)
-            d = disparity[y, x]
-            for n in range(1, views.steps.shape[0]):
-                a, b = views.steps[n, 0], views.steps[n, 1]
-                sy, sx = y - d * a, x - d * b
-                if not (1 <= sy < height - 2 and 1 <= sx < width - 2):
-                    continue
-                j, i = int(sy), int(sx)
-                a0, a1, a2, a3 = _cubic(np.float32(sy - j))
-                b0, b1, b2, b3 = _cubic(np.float32(sx - i))
-                p = views.pixels[n]
-                e0 = _sample(p[0], j, i, a0, a1, a2, a3, b0, b1, b2, b3) - o0
-                e1 = _sample(p[1], j, i, a0, a1, a2, a3, b0, b1, b2, b3) - o1
-                e2 = _sample(p[2], j, i, a0, a1, a2, a3, b0, b1, b2, b3) - o2
-                s0, s1, s2 = a * gy0 + b * gx0, a * gy1 + b * gx1, a * gy2 + b * gx2
-                w = np.float32(1.0) / (np.float32(1.0) + (e0 * e0 + e1 * e1 + e2 * e2) / (limit * limit))
-                w *= w
-                q = (2 if a + b > 0.0 or (a + b == 0.0 and a > 0.0) else 0) + (
-                    1 if a - b > 0.0 or (a - b == 0.0 and a > 0.0) else 0
-                )
-                push[q, y, x] += w * (e0 * s0 + e1 * s1 + e2 * s2)
-                weight[q, y, x] += w * (s0 * s0 + s1 * s1 + s2 * s2)
-                m0 += w * e0
-                m1 += w * e1
-                m2 += w * e2
-                mass += w
-            mean[0, y, x], mean[1, y, x], mean[2, y, x] = o0 + m0 / mass, o1 + m1 / mass, o2 + m2 / mass
+            if here[y, x]:
+                for c in range(3):
+                    mean[c, y, x] += moved[c, x] / mass[x]
 
 
 @stage_kernel
-def _sample(p, j, i, a0, a1, a2, a3, b0, b1, b2, b3):
-    """Return the cubic interpolation of an image around the pixel (j, i)."""
-    return (
-        a0 * (b0 * p[j - 1, i - 1] + b1 * p[j - 1, i] + b2 * p[j - 1, i + 1] + b3 * p[j - 1, i + 2])
-        + a1 * (b0 * p[j, i - 1] + b1 * p[j, i] + b2 * p[j, i + 1] + b3 * p[j, i + 2])
-        + a2 * (b0 * p[j + 1, i - 1] + b1 * p[j + 1, i] + b2 * p[j + 1, i + 1] + b3 * p[j + 1, i + 2])
-        + a3 * (b0 * p[j + 2, i - 1] + b1 * p[j + 2, i] + b2 * p[j + 2, i + 1] + b3 * p[j + 2, i + 2])
-    )
+def _differences(pixels, n, height, a, b, y, disparity, here, colours, off, seen):
+    """Set the differences of a row from view n, whose step is (a, b), and 1 where they are seen, else 0."""
+    width = disparity.size
+    plane, row = np.uint64(height * width), np.uint64(width)
+    start = np.uint64(3 * n) * plane
+    bottom, right = np.float32(height - 2), np.float32(width - 2)
+    off[:], seen[:] = 0.0, 0.0
+    for x in range(1, width - 1):
+        if not here[x]:
+            continue
+        sy, sx = np.float32(y) - disparity[x] * a, np.float32(x) - disparity[x] * b
+        if not (_ONE <= sy < bottom and _ONE <= sx < right):
+            continue
+        j, i = int(sy), int(sx)
+        down, across = _cubic(sy - np.float32(j)), _cubic(sx - np.float32(i))
+        at = start + np.uint64((j - 1) * width + i - 1)
+        off[0, x] = sample_4x4(pixels, at, row, down, across) - colours[0, x]
+        off[1, x] = sample_4x4(pixels, at + plane, row, down, across) - colours[1, x]
+        off[2, x] = sample_4x4(pixels, at + plane + plane, row, down, across) - colours[2, x]
+        seen[x] = _ONE
+
+
+@stage_kernel
+def _weigh(limit, a, b, down, across, off, seen, push, weight, moved, mass):
+    """Add the evidence of a view to a row; every loop writes one array, and becomes vector instructions."""
+    e0, e1, e2, scale = off[0], off[1], off[2], _ONE / (limit * limit)
+    d0, d1, d2, a0, a1, a2 = down[0], down[1], down[2], across[0], across[1], across[2]
+    for x in range(seen.size):
+        odds = _ONE + (e0[x] * e0[x] + e1[x] * e1[x] + e2[x] * e2[x]) * scale
+        seen[x] = seen[x] / (odds * odds)
+    for x in range(seen.size):
+        slopes = e0[x] * (a * d0[x] + b * a0[x]) + e1[x] * (a * d1[x] + b * a1[x]) + e2[x] * (a * d2[x] + b * a2[x])
+        push[x] += seen[x] * slopes
+    for x in range(seen.size):
+        s0, s1, s2 = a * d0[x] + b * a0[x], a * d1[x] + b * a1[x], a * d2[x] + b * a2[x]
+        weight[x] += seen[x] * (s0 * s0 + s1 * s1 + s2 * s2)
+    for c in range(3):
+        e, m = off[c], moved[c]
+        for x in range(seen.size):
+            m[x] += seen[x] * e[x]
+    for x in range(seen.size):
+        mass[x] += seen[x]
 
 
 @lean_kernel

@@ -17,7 +17,7 @@ ndimage = Lazy("scipy.ndimage")
 MOSTLY, WHITER, SIDE, REACH = 0.8, 0.1, 9, 13
 SMOOTH = 1.0  # standard deviation of the blur against noise, px
 TINY = 1e-12  # squared changes below it are rounding
-WHITE = np.full((3, 1, 1), 3**-0.5)
+WHITE = np.full((3, 1, 1), 3**-0.5, np.float32)
 
 
 def highlights(view: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -29,7 +29,8 @@ def highlights(view: NDArray[np.float32]) -> NDArray[np.bool_]:
     ----------
     Shafer, Using color to separate reflection components, Color Research and Application 1985.
     """
-    light = ndimage.gaussian_filter(linear(view / 65535), (0, SMOOTH, SMOOTH))
+    planes = (linear(plane / 65535).astype(np.float32) for plane in view)  # one by one, for less memory
+    light = np.stack([ndimage.gaussian_filter(plane, SMOOTH) for plane in planes])
     colour = ndimage.uniform_filter(light, (0, SIDE, SIDE))
     colour /= np.maximum(np.linalg.norm(colour, axis=0), 1e-6)
     slopes = np.stack(np.gradient(light, axis=(1, 2)))

@@ -8,9 +8,11 @@ from scipy import ndimage
 
 from ii_core import IICamera, IIPicture, depth_of_disparity, estimate_depth
 from ii_core.base.colour import srgb
+from ii_core.base.jit import lean_kernel
 from ii_core.camera.optics import Lens
 from ii_core.depth.all_views import disparity_of_views
 from ii_core.depth.around import half_lines, views_around
+from ii_core.depth.disparity_kernels import Views, add_evidence, sample_4x4
 from ii_core.depth.estimate import (
     CODES,
     OTHER_SURFACE,
@@ -99,6 +101,43 @@ def disc(front, back, size=(72, 60), views=7, radius=17.0):
     codes = np.rint(noisy.clip(0, 255)).astype(np.uint8)
     true = np.where(inside(x, y), front, back)
     return IIPicture(codes.reshape(l * views, k * views, 3), size, (views, views)), true
+
+
+@lean_kernel
+def _sampled(pixels, at, row, down, across):
+    return sample_4x4(pixels, np.uint64(at), np.uint64(row), down, across)
+
+
+def test_samples_are_weighted_by_both_ways():
+    pixels = RNG.integers(0, 65536, 60, np.uint16)
+    down, across = (tuple(RNG.uniform(-0.2, 1, 4).astype(np.float32)) for _ in range(2))
+    block = pixels.reshape(6, 10)[1:5, 3:7].astype(float)
+    true = np.array(down, float) @ block @ np.array(across, float)
+    for function in (_sampled, sample_4x4):
+        assert function(pixels, 13, 10, down, across) == pytest.approx(true, rel=1e-5)
+
+
+def test_evidence_of_a_ramp_is_exact():
+    """Cubic interpolation keeps a ramp: a view that is a step away differs by the slope times disparity and step."""
+    y, x = np.mgrid[:20, :24].astype(float)
+    slopes = np.array([[300, -200], [0, 500], [-400, 100]], float)  # down, across
+    ramp = 30000 + slopes[:, :1, None] * y + slopes[:, 1:, None] * x
+    steps = np.array([[0, 0], [0, 1], [0, -1], [2, 0], [-1, -1]], np.float32)
+    true, guess = 0.5, np.full((20, 24), 0.25, np.float32)
+    moves = (slopes @ steps.T)[:, :, None, None] * true  # p·D: a point at x stands at x − p·D in a view
+    pixels = np.rint(ramp[:, None] + moves).transpose(1, 0, 2, 3).astype(np.uint16)
+    push, weight, mean = np.zeros((4, 20, 24), np.float32), np.zeros((4, 20, 24), np.float32), np.zeros_like(ramp)
+    views, here = Views(np.ascontiguousarray(pixels), steps, half_lines(steps)), np.ones((20, 24), bool)
+    mean = mean.astype(np.float32)
+    add_evidence(views, guess, np.float32(1e9), ramp.astype(np.float32), here, push, weight, mean, 0, 20)
+    inner = (slice(4, -4), slice(4, -4))
+    step = push.sum(axis=0)[inner] / weight.sum(axis=0)[inner]
+    assert guess[inner] + step == pytest.approx(true, abs=1e-4)
+    assert [q for q in range(4) if weight[q].any()] == [0, 1, 2, 3]
+    off = (slopes @ steps.T).sum(axis=1) * (true - 0.25) / len(steps)  # the views' mean, the reference included
+    assert (mean - ramp)[(slice(None), *inner)] == pytest.approx(
+        np.broadcast_to(off[:, None, None], (3, 12, 16)), abs=0.2
+    )
 
 
 @pytest.mark.slow

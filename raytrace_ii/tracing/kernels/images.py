@@ -9,10 +9,10 @@ from llvmlite import ir
 from numba import types
 
 from ii_core.base.colour import LINEAR
-from ii_core.base.jit import lane_part, lane_stage
+from ii_core.base.jit import compiled_by, lane_part, lane_stage
 
 from . import lanes as at
-from .lanes import BLOCK, bits_of, compiled_by, single_of, take_rows
+from .lanes import BLOCK, bits_of, single_of, take_rows
 from .tables import IMAGE_COLUMNS, LEVELS, REPEAT
 from .textures import filter_taps, folded, texels_about
 

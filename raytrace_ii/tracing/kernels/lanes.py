@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core.typing import templates
 from numpy.typing import NDArray
 
-from ii_core.base.jit import stage_kernel
+from ii_core.base.jit import compiled_by, stage_kernel
 
 BLOCK = 16  # rays that go from their start to their light together: what is kept of them stays in the first cache
 LINE = 64  # bytes of a cache line
@@ -126,18 +125,6 @@ def aligned(count: int) -> NDArray[np.float32]:
     raw = np.zeros(4 * count + LINE, np.uint8)
     start = -raw.ctypes.data % LINE
     return raw[start : start + 4 * count].view(np.float32)
-
-
-def compiled_by(typing: Any) -> Any:
-    """Have kernels take the code of an intrinsic in place of a function, whose source Python runs."""
-
-    def replaced(function: Any) -> Any:
-        template = templates.make_intrinsic_template(function, typing, function.__name__)
-        templates.infer(template)
-        templates.infer_global(function, types.Function(template))
-        return function
-
-    return replaced
 
 
 def _take_rows(typing: Any, table: Any, columns: Any, first: Any, rows: Any, at: Any, out: Any, to: Any) -> Any:
