@@ -249,9 +249,10 @@ def test_cameras_of_the_next_test_have_what_their_names_say(usual_pictures):
     assert render(hall(), SMALL).stats.embree == library().about
 
 
+@pytest.mark.slow  # 10–20 s: single rays have kernels of their own
 @pytest.mark.parametrize(
     ("configuration", "says"),
-    first_fast([("embreex", "embreex"), ("isa=avx2", "packets of 8"), ("isa=sse4.2", "packets of 4")]),
+    [("embreex", "embreex"), ("isa=avx2", "packets of 8"), ("isa=sse4.2", "packets of 4")],
 )
 def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, usual_pictures, monkeypatch):
     """AVX2, SSE and embreex's single rays; stats say which it was.
@@ -267,8 +268,9 @@ def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, u
             np.testing.assert_array_equal(other[name], expected, err_msg=name)
             continue
         # Single pixels differ by a float32 rounding, presumably where a ray meets the edge of two faces: either
-        # may be found. Up to 1 of 1395 pixels was seen to differ, by 1 code of 16 bits; of depths 4, by one or two
-        # roundings, all in rows 17–22 where the glass ball's faces are smaller than pixels (2026-11-25).
+        # may be found. Up to 1 of 1395 pixels was seen to differ, by 1 code of 16 bits; of depths 4 (2026-11-25),
+        # on a CPU without AVX-512 5 (2026-11-29), by one or two roundings, all in rows 17–22 where the glass ball's faces
+        # are smaller than pixels.
         differs = (other[name] != expected) & ~(np.isnan(other[name]) & np.isnan(expected))
         if (says, name) == ("packets of 4", "odd lenses, 3 samples"):
             # One sample's primary hit is the same and its radiance 1e-4 off: a later ray meets the other face.
@@ -276,7 +278,8 @@ def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, u
             assert np.abs(other[name].astype(float) - expected).max() <= 2
             continue
         # Packets add light that meets no glass before that of other rays of a pixel: up to 7 of 5952 numbers.
-        assert differs.sum() <= (differs.size // 500 if single else 4), name
+        most = differs.size // 250 if "depth" in name else differs.size // 500 if single else 4
+        assert differs.sum() <= most, name
         step = 2.0**-22 * expected[differs] if "depth" in name else 1
         assert (np.abs(other[name][differs].astype(float) - expected[differs]) <= step).all(), name
 
