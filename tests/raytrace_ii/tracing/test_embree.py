@@ -269,8 +269,8 @@ def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, u
             continue
         # Single pixels differ by a float32 rounding, presumably where a ray meets the edge of two faces: either
         # may be found. Up to 1 of 1395 pixels was seen to differ, by 1 code of 16 bits; of depths 4 (2026-11-25),
-        # on a CPU without AVX-512 5 (2026-11-29), by one or two roundings, all in rows 17–22 where the glass ball's faces
-        # are smaller than pixels.
+        # on a CPU without AVX-512 5 (2026-11-29), by one or two roundings, all in rows 17–22 where the glass ball's
+        # faces are smaller than pixels.
         differs = (other[name] != expected) & ~(np.isnan(other[name]) & np.isnan(expected))
         if (says, name) == ("packets of 4", "odd lenses, 3 samples"):
             # One sample's primary hit is the same and its radiance 1e-4 off: a later ray meets the other face.
