@@ -284,6 +284,7 @@ def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, u
         assert (np.abs(other[name][differs].astype(float) - expected[differs]) <= step).all(), name
 
 
+@pytest.mark.slow  # as above
 @pytest.mark.parametrize("reason", ["version", "layout", "configuration", "library"])
 def test_an_unknown_library_falls_back_to_embreex_and_says_so(reason, monkeypatch):
     embree._opened.cache_clear()
