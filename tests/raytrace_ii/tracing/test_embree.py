@@ -249,6 +249,14 @@ def test_cameras_of_the_next_test_have_what_their_names_say(usual_pictures):
     assert render(hall(), SMALL).stats.embree == library().about
 
 
+def through_edges(camera):
+    """Whether the ray of a pixel passes through an edge of the face it meets: its neighbour may be found instead."""
+    hits, _ = packed_scene(hall()).intersector.nearest(*(x.reshape(-1, 3).astype(np.float32) for x in camera.rays()))
+    _, u, v, _ = hits
+    edge = np.minimum(np.minimum(u, v), 1 - u - v) <= 1e-6
+    return ((hits.faces >= 0) & edge).reshape(camera.rays()[0].shape[:-1])
+
+
 @pytest.mark.slow  # 10–20 s: single rays have kernels of their own
 @pytest.mark.parametrize(
     ("configuration", "says"),
@@ -267,18 +275,20 @@ def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, u
         if name.startswith("small") and not single:
             np.testing.assert_array_equal(other[name], expected, err_msg=name)
             continue
-        # Single pixels differ by a float32 rounding, presumably where a ray meets the edge of two faces: either
-        # may be found. Up to 1 of 1395 pixels was seen to differ, by 1 code of 16 bits; of depths 4, by one or two
-        # roundings, all in rows 17–22 where the glass ball's faces are smaller than pixels (2026-11-25).
-        # Without AVX-512 it fails: of one pixel per lens, 5 depths differ by a rounding (2026-11-29).
+        # A ray through the edge of two faces meets either, by the order in which the tree is searched; their planes
+        # are one or two roundings apart there. The cameras' rows and columns go through edges of the glass ball.
+        # Of later rays less is known: up to 1 of 1395 pixels was seen to differ, by 1 code of 16 bits.
         differs = (other[name] != expected) & ~(np.isnan(other[name]) & np.isnan(expected))
         if (says, name) == ("packets of 4", "odd lenses, 3 samples"):
             # One sample's primary hit is the same and its radiance 1e-4 off: a later ray meets the other face.
             assert np.argwhere(differs.any(axis=-1)).tolist() in ([], [[0, 23]])
             assert np.abs(other[name].astype(float) - expected).max() <= 2
             continue
-        # Packets add light that meets no glass before that of other rays of a pixel: up to 7 of 5952 numbers.
-        assert differs.sum() <= (differs.size // 500 if single else 4), name
+        if name.endswith("depth, 1 samples"):
+            edges = through_edges(CAMERAS[name.split(",")[0]])
+            assert edges.mean() < 0.06 and edges[differs].all(), name
+        else:  # Packets add light that meets no glass before that of other rays of a pixel: up to 7 of 5952 numbers.
+            assert differs.sum() <= (differs.size // 500 if single else 4), name
         step = 2.0**-22 * expected[differs] if "depth" in name else 1
         assert (np.abs(other[name][differs].astype(float) - expected[differs]) <= step).all(), name
 
