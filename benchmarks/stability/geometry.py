@@ -16,9 +16,8 @@ from benchmarks.accuracy.analytic import World, still_life
 from ii_core import preset
 from raytrace_ii import Body, Light, Material, Scene, trace
 from raytrace_ii.shapes.primitives import Mesh, Plane, Sphere, rotation
-from raytrace_ii.tracing import lift as lifts
-from raytrace_ii.tracing.lift import LIFT
-from raytrace_ii.tracing.packing import packed
+from raytrace_ii.tracing import packing
+from raytrace_ii.tracing.packing import LIFT, packed
 
 Row = dict[str, Any]
 WHITE = Material(colour=(1.0, 1.0, 1.0))
@@ -57,11 +56,11 @@ def _length(vectors: NDArray[Any]) -> NDArray[Any]:
 @contextmanager
 def lifted(share: float) -> Iterator[None]:
     """Pack scenes with another lift of spawned rays, as a share of the coordinates."""
-    lifts.LIFT = share
+    packing.LIFT = share
     try:
         yield
     finally:
-        lifts.LIFT = LIFT
+        packing.LIFT = LIFT
 
 
 def own_shadow(scale: float, offset: float, n: int = 4000) -> tuple[float, float, float]:

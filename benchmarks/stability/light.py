@@ -11,7 +11,7 @@ from benchmarks.accuracy.analytic import still_life
 from benchmarks.stability.geometry import Row, ball, body, ground
 from raytrace_ii import Background, Light, Material, Scene, trace
 from raytrace_ii.shapes.primitives import Box, Mesh
-from raytrace_ii.tracing.lift import LIFT
+from raytrace_ii.tracing.packing import LIFT
 
 ONES = (1.0, 1.0, 1.0)
 # Direction of a light, not aligned with any ring of a ball's vertices.

@@ -20,16 +20,12 @@ from numpy.typing import NDArray
 from ..base.checks import MOST_MM, flag, length, number, sequence, within
 from .elements import Bundle, FrontElement
 from .glass import LINE_D_NM, Glass, glass
+from .refraction import TOUCH_MM, Refracting, traced
 
 MOST_SURFACES = 200
 FAN = 32  # heights of the parallel rays that test whether a lens lets light through
-# Surfaces that touch at the rim, as computed: published lengths have seven digits.
-TOUCH_MM = 1e-5
 MOST_ASPHERIC = 8  # coefficients, up to that of r¹⁶
 MOST_COEFFICIENT = 1e30
-MOST_STEPS = 100  # of Newton's method with bisection; most rays take four to six
-ROUNDING = 64 * float(np.finfo(np.float64).eps)  # of a sag, against the sum of its terms
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -285,34 +281,29 @@ class Surfaces(FrontElement):
     # -- rays
 
     def pass_on(self, rays: Bundle) -> Bundle:
-        x, y, z, dx, dy, dz, passes, _ = self._traced(rays)
-        given = 1.0 if rays.weight is None else rays.weight
-        weight = np.asarray(passes * given, np.float64)
+        x, y, z, dx, dy, dz, stopped = self._traced(rays)
+        weight = (stopped == 0) * (1.0 if rays.weight is None else rays.weight)
         return Bundle(x, y, z, dx, dy, dz, weight)
 
     def _traced(self, rays: Bundle) -> tuple[Any, ...]:
-        """Return the six coordinates of rays behind the first surface, whether they pass, and the surface, from 1,
-        that stopped each; 0 of rays that pass."""
-        x, y, z, dx, dy, dz = np.broadcast_arrays(*(np.asarray(a, np.float64) for a in rays[:6]))
-        passes = dz > 0
-        size = np.sqrt(dx * dx + dy * dy + dz * dz)
-        size = np.where(passes, size, 1.0)
-        dx, dy, dz = (
-            np.where(passes, dx / size, 0.0),
-            np.where(passes, dy / size, 0.0),
-            np.where(passes, dz / size, 1.0),
-        )
-        stopped = np.where(passes, 0, len(self.surfaces)).astype(np.int16)
-        index = 1.0
-        for i in reversed(range(len(self.surfaces))):
-            after = 1.0 if i == 0 else self._indices[i - 1]
-            x, y, z, dx, dy, dz, through = _refracted(
-                (x, y, z, dx, dy, dz), self.surfaces[i], self._vertices[i], index, after
+        """Return the six coordinates of rays behind the first surface, and the surface, from 1, that stopped each; 0
+        of rays that pass."""
+        coordinates = np.array(np.broadcast_arrays(*rays[:6]), np.float64)
+        stopped = traced(coordinates.reshape(6, -1), self._met)
+        return *coordinates, stopped.reshape(coordinates.shape[1:])
+
+    @cached_property
+    def _met(self) -> list[Refracting]:
+        """Surfaces in the order in which rays meet them."""
+        after = (1.0, *self._indices[:-1])
+        found = [
+            Refracting(
+                surface.curvature, surface.conic, surface.aspheric,
+                -1.0 if surface.diameter_mm is None else surface.diameter_mm / 2, *lies,
             )
-            stopped = np.where(passes & ~through, i + 1, stopped)
-            passes = passes & through
-            index = after
-        return x, y, z, dx, dy, dz, passes, stopped
+            for surface, *lies in zip(self.surfaces, self._vertices, self._indices, after, strict=True)
+        ]  # fmt: skip
+        return found[::-1]
 
     def _check_open(self) -> None:
         """Raise ValueError if no ray parallel to the axis passes, but the axis itself."""
@@ -320,8 +311,8 @@ class Surfaces(FrontElement):
         heights = min(rims) / 2 * (np.arange(FAN) + 1) / FAN
         start = self.z_mm - 1e3 * max(rims)  # behind any sag; the rays are parallel
         zero, one = np.float64(0), np.float64(1)
-        *_, passes, stopped = self._traced(Bundle(heights, zero, np.float64(start), zero, zero, one))
-        if not passes.any():
+        *_, stopped = self._traced(Bundle(heights, zero, np.float64(start), zero, zero, one))
+        if stopped.all():
             raise ValueError(
                 f"surfaces: no ray beside the axis passes: surface {stopped[0]} stops it, by its rim or "
                 "by total reflection"
@@ -380,159 +371,6 @@ def _check_apart(number: int, near: Surface, far: Surface) -> None:
                 f"surfaces: surfaces {number} and {number + 1} cross: the gap {height:.4g} mm from the axis is "
                 f"{gap:.4g} mm"
             )
-
-
-def _refracted(ray: tuple[Any, ...], surface: Surface, vertex: float, index: float, after: float) -> tuple[Any, ...]:
-    """Return the rays behind a surface and whether they pass; directions are unit vectors and stay so.
-
-    The surface lies at z = vertex − sag.
-    """
-    x, y, z, dx, dy, dz = ray
-    c, k = -surface.curvature, 1 + surface.conic
-    to_plane = (vertex - z) / dz
-    x0, y0 = x + dx * to_plane, y + dy * to_plane
-    if surface.aspheric:
-        t, through = _to_asphere((x0, y0, dx, dy, dz), surface)
-        x, y, depth = x0 + dx * t, y0 + dy * t, dz * t
-        with np.errstate(over="ignore", invalid="ignore"):
-            steep = _slope(np.where(through, x * x + y * y, 0.0), surface)
-            tilt: Any = np.sqrt(4 * steep * steep * (x * x + y * y) + 1)
-        through = through & np.isfinite(tilt)
-        steep, tilt = np.where(through, steep, 0.0), np.where(through, tilt, 1.0)
-        nx, ny, nz = 2 * steep * x / tilt, 2 * steep * y / tilt, 1 / tilt
-        z = vertex + depth
-        through = through & (dx * nx + dy * ny + dz * nz > 0) & (to_plane + t >= -TOUCH_MM)
-    elif c:
-        t, through = _to_conic((x0, y0, dx, dy, dz), c, surface.conic)
-        x, y, depth = x0 + dx * t, y0 + dy * t, dz * t
-        steep = 1 - k * c * depth  # z component of the normal before it is a unit vector
-        through = through & (steep > 0)
-        size = np.sqrt(c * c * (x * x + y * y) + steep * steep)
-        size = np.where(size > 0, size, 1.0)
-        nx, ny, nz = -c * x / size, -c * y / size, steep / size
-        z = vertex + depth
-        through = through & (to_plane + t >= -TOUCH_MM)
-    else:
-        x, y, z = x0, y0, np.full_like(x0, vertex)
-        nx, ny, nz = (np.float64(axis) for axis in (0, 0, 1))
-        through = to_plane >= -TOUCH_MM
-    if surface.diameter_mm is not None:
-        through = through & (x * x + y * y <= (surface.diameter_mm / 2) ** 2)
-    if index == after:
-        return x, y, z, dx, dy, dz, through
-    cosine = dx * nx + dy * ny + dz * nz
-    ratio = index / after
-    rest = 1 - ratio * ratio * (1 - cosine * cosine)
-    through = through & (rest > 0) & (cosine > 0)
-    bend = np.sqrt(np.maximum(rest, 0)) - ratio * cosine
-    dx, dy, dz = ratio * dx + bend * nx, ratio * dy + bend * ny, ratio * dz + bend * nz
-    forward = dz > 0
-    dx, dy, dz = (np.where(forward, d, safe) for d, safe in ((dx, 0.0), (dy, 0.0), (dz, 1.0)))
-    return x, y, z, dx, dy, dz, through & forward
-
-
-def _to_conic(ray: tuple[Any, ...], c: float, conic: float) -> tuple[Any, Mask]:
-    """Return the distance past the vertex plane at which rays from there meet a conic, and whether they do.
-
-    With c = −1/R, the distance t fulfils A·t² − 2B·t + C = 0. C/(B + √(B² − AC)) is the root next to the vertex,
-    exact for planes too.
-    """
-    x0, y0, dx, dy, dz = ray
-    square = c * (x0 * x0 + y0 * y0)
-    b = dz - c * (x0 * dx + y0 * dy)
-    under = b * b - c * (1 + conic * dz * dz) * square
-    below = b + np.sqrt(np.maximum(under, 0))
-    return square / np.where(below > 0, below, 1.0), (under >= 0) & (below > 0)
-
-
-def _slope(square: Any, surface: Surface) -> Any:
-    """Return the derivative of the sag after r², inside the edge of the conic."""
-    c = surface.curvature
-    total = 0.0 * square
-    for power in reversed(range(len(surface.aspheric))):
-        total = total * square + (power + 1) * surface.aspheric[power]
-    return total + c / (2 * np.sqrt(1 - (1 + surface.conic) * c * c * square))
-
-
-def _to_asphere(ray: tuple[Any, ...], surface: Surface) -> tuple[Any, Mask]:
-    """Return the distance past the vertex plane at which rays from there meet an even asphere, and whether they do.
-
-    Newton's method from the point on the conic, or from the vertex plane if a ray misses the conic. The residual is
-    the height over the surface. A ray that enters the rim below the surface and leaves it above brackets a root: a
-    step out of the bracket, or one that does not halve the residual, gives way to bisection. For other rays, a step
-    that does not lessen the residual is halved. A ray meets the surface if its residual falls to its rounding.
-    """
-    rays = tuple(np.ravel(a) for a in ray)
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        start, on_conic = _to_conic(rays, -surface.curvature, surface.conic)
-        low, high = _bracket(rays, surface)
-        found = np.where(on_conic, start, 0.0)
-        closed = np.isfinite(low)
-        found = np.where(closed & ~((low < found) & (found < high)), (low + high) / 2, found)
-        met = np.zeros(found.shape, bool)
-        left, t = np.arange(found.size), found.copy()
-        residual, slope, rounding = _residual(rays, t, surface)
-        step = -residual / slope
-        for _ in range(MOST_STEPS):
-            done = np.isfinite(residual) & (np.abs(residual) <= rounding)
-            found[left[done]], met[left[done]] = t[done], True
-            on = ~done & np.isfinite(step)
-            if not on.any():
-                break
-            left, t, residual, step = left[on], t[on], residual[on], step[on]
-            low, high, closed = low[on], high[on], closed[on]
-            trial = t + step
-            trial = np.where(closed & ~((low < trial) & (trial < high)), (low + high) / 2, trial)
-            after, slope, rounding = _residual(tuple(a[left] for a in rays), trial, surface)
-            low, high = np.where(closed & (after < 0), trial, low), np.where(closed & (after > 0), trial, high)
-            better = np.abs(after) < np.abs(residual)
-            newton = -after / slope
-            halved = np.abs(after) <= 0.5 * np.abs(residual)
-            bisection = (low + high) / 2 - trial
-            step = np.where(closed, np.where(halved, newton, bisection), np.where(better, newton, step / 2))
-            taken = closed | better
-            t, residual = np.where(taken, trial, t), np.where(taken, after, residual)
-            rounding = np.where(taken, rounding, 0.0)
-    shape = np.shape(ray[0])
-    return np.where(met, found, 0.0).reshape(shape), met.reshape(shape)
-
-
-def _bracket(ray: tuple[Any, ...], surface: Surface) -> tuple[Any, Any]:
-    """Return the distances at which rays enter the rim below a surface and leave it above it, or infinities."""
-    x0, y0, dx, dy, _ = ray
-    reach = math.inf if surface.diameter_mm is None else surface.diameter_mm / 2
-    bend = (1 + surface.conic) * surface.curvature**2
-    if bend > 0:
-        reach = min(reach, (1 - 1e-9) / math.sqrt(bend))
-    across = dx * dx + dy * dy
-    along = x0 * dx + y0 * dy
-    under = along * along - across * (x0 * x0 + y0 * y0 - reach * reach)
-    root = np.sqrt(np.where(under > 0, under, 0.0))
-    slanted = np.where(across > 0, across, 1.0)
-    low, high = (-along - root) / slanted, (-along + root) / slanted
-    crosses = (across > 0) & (under > 0) & np.isfinite(low) & np.isfinite(high)
-    low, high = np.where(crosses, low, 0.0), np.where(crosses, high, 0.0)
-    crosses = crosses & (_residual(ray, low, surface)[0] < 0) & (_residual(ray, high, surface)[0] > 0)
-    return np.where(crosses, low, -np.inf), np.where(crosses, high, np.inf)
-
-
-def _residual(ray: tuple[Any, ...], t: Any, surface: Surface) -> tuple[Any, Any, Any]:
-    """Return the height of rays over an asphere, its derivative along the ray, and its rounding.
-
-    The height is infinite beyond the edge of the conic.
-    """
-    x0, y0, dx, dy, dz = ray
-    x, y = x0 + dx * t, y0 + dy * t
-    square = x * x + y * y
-    c = surface.curvature
-    under = 1 - (1 + surface.conic) * c * c * square
-    inside = under > 0
-    conic = c * square / (1 + np.sqrt(np.where(inside, under, 1.0)))
-    height = np.where(inside, dz * t + conic + _polynomial(surface.aspheric, square), np.inf)
-    slope = dz + 2 * _slope(np.where(inside, square, 0.0), surface) * (x * dx + y * dy)
-    terms = np.abs(conic) + _polynomial([abs(a) for a in surface.aspheric], square)
-    rounding = ROUNDING * (terms + np.abs(x0) + np.abs(y0) + np.abs(t))
-    return height, np.where(slope != 0, slope, 1.0), rounding
 
 
 def surfaces_of(elements: Sequence[Any]) -> tuple[Surfaces, ...]:

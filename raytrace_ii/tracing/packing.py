@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ..scene.scene import Body, Light, Material, Scene, Vector, unit_rows
 from ..scene.textures import Image
-from . import lift
 from .columns import NO_COLUMNS, columns_across, light_columns
 from .intersect import Intersector
 from .kernels import tables
@@ -25,6 +24,13 @@ from .texture_table import TextureTable
 
 OF_ROD = 500  # vertices that tell the longest axis of a body
 MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
+# Spawned rays start this share of the face's largest coordinate off the face: float32 places a hit to about
+# 1e-7 of it, and from 1e-6 on no ray meets its own face again.
+LIFT = 4e-6
+# Embree tells the sides of a face by the product of its normal, as long as twice its area, and the way from the ray's
+# start, in float32: a lift of fewer subnormal steps is rounded away. It is at most this share of the longest edge.
+LIFT_STEPS, MOST_LIFT = 8 * float(np.finfo(np.float32).smallest_subnormal), 1e-3
+SOME_FACES = 1 << 16  # of the table, at a time: in float64 all at once would take ten times its memory
 
 _kept: WeakKeyDictionary[Scene, PackedScene] = WeakKeyDictionary()
 _building = threading.Lock()  # Embree's tree is built once, however many threads come first
@@ -209,7 +215,7 @@ def _brightest_emission(body: Body) -> float:
 
 def _meeting(bounds: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(B, B): whether bounds touch or overlap, to float32's precision."""
-    slack = 4 * lift.LIFT * np.abs(bounds).max(axis=(1, 2))[:, None]
+    slack = 4 * LIFT * np.abs(bounds).max(axis=(1, 2))[:, None]
     low, high = bounds[:, 0] - slack, bounds[:, 1] + slack
     return ((low[:, None] <= high[None]) & (high[:, None] >= low[None])).all(axis=2)
 
@@ -226,7 +232,7 @@ def _overlapping(bodies: Sequence[Body], meeting: NDArray[np.bool_]) -> list[NDA
         above = sum(meeting[b, other] for other in order[:place])
         if above:
             vertices = np.asarray(bodies[b].vertices, np.float64)
-            step = above * 4 * lift.LIFT * np.abs(vertices).max()
+            step = above * 4 * LIFT * np.abs(vertices).max()
             grown[b] = vertices + step * _corner_normals(vertices, np.asarray(bodies[b].faces))
     return grown
 
@@ -277,7 +283,7 @@ def _face_rows(
     padded = aligned(max(len(corners), 2) * columns).reshape(-1, columns)
     rows = padded[: len(corners)]
     rows[:, : tables.FACE] = corners.reshape(-1, 9)
-    lift.fill_face_table(corners, rows[:, tables.FACE : tables.BODY])
+    _fill_faces(corners, rows[:, tables.FACE : tables.BODY])
     rows[:, tables.BODY] = bodies
     if len(normals):
         rows[:, tables.NORMALS : tables.COORDINATES] = normals.reshape(-1, 9)
@@ -285,6 +291,23 @@ def _face_rows(
         rows[:, tables.COORDINATES : tables.COORDINATES + 6] = coordinates[:, :, :2].reshape(-1, 6)
         rows[:, tables.THIRD] = coordinates[:, :, 2]
     return padded
+
+
+def _fill_faces(corners: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Write unit normal (0 for a face without area) and lift in mm of every face as rows of ``out``."""
+    for first in range(0, len(corners), SOME_FACES):
+        some = slice(first, first + SOME_FACES)
+        out[some] = _normals_and_lifts(corners[some].astype(np.float64))
+
+
+def _normals_and_lifts(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
+    least = np.divide(LIFT_STEPS, length[:, 0], out=np.zeros_like(longest), where=length[:, 0] > 0)
+    lift = np.maximum(LIFT * np.abs(p).max(axis=(1, 2)), np.minimum(least, MOST_LIFT * longest))
+    return np.column_stack([unit, lift])
 
 
 def _light_row(light: Light) -> list[float]:

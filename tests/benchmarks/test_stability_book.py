@@ -7,7 +7,7 @@ import pytest
 from benchmarks.stability import __main__ as book
 from benchmarks.stability import curves, depth, geometry, light, picture
 from benchmarks.stability.excerpts import EXCERPTS, Excerpt
-from raytrace_ii.tracing.lift import LIFT
+from raytrace_ii.tracing.packing import LIFT
 
 ROOT = Path(__file__).parents[2]
 

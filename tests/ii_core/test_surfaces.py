@@ -4,6 +4,7 @@ import hashlib
 import json
 import math
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ii_core import IICamera, preset
+from ii_core.camera import refraction
 from ii_core.camera.elements import Bundle
 from ii_core.camera.glass import CATALOGUE, LINE_C_NM, LINE_D_NM, LINE_F_NM, Glass, catalogue, glass
 from ii_core.camera.prescriptions import lens, lens_names
@@ -863,3 +865,25 @@ def test_aspheres_enlarge_and_survive_their_file():
     heights = np.linspace(-8, 8, 9)
     small, large = made.pass_on(fan(0.0, heights)), twice.pass_on(fan(0.0, 2 * heights))
     np.testing.assert_allclose(large.dy, small.dy, atol=ROUNDING)
+
+
+def test_the_kernel_without_compilation():
+    """Rays through an asphere, a conic, a stop and a plane; some are stopped at each, some run backwards."""
+    made = Surfaces(
+        z_mm=5.0,
+        surfaces=(
+            {**GOOD, "thickness_mm": 6.0, "aspheric": [1e-4, -2e-5], "stop": False},
+            {"radius_mm": -40.0, "conic": -1.5, "thickness_mm": 2.0, "diameter_mm": 18.0},
+            {"thickness_mm": 1.0, "diameter_mm": 11.0, "stop": True},
+            {},
+        ),
+    )
+    rng = np.random.default_rng(0)
+    coordinates = np.concatenate([rng.normal(0, 4, (2, 600)), np.zeros((1, 600)), rng.normal(0, 0.4, (3, 600))])
+    coordinates[5] += 0.9
+    found = coordinates.copy()
+    stopped = refraction.traced(found, made._met)
+    assert set(stopped) == {0, 1, 2, 3, 4}
+    with patch.object(refraction, "_trace", refraction._trace.py_func), np.errstate(all="ignore"):
+        np.testing.assert_array_equal(refraction.traced(coordinates, made._met), stopped)
+    np.testing.assert_array_equal(coordinates, found)

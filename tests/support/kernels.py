@@ -38,6 +38,7 @@ def rendering():
         scene = load_scene(name)
         for camera in preset("setup1", scale=64), preset("pinhole2d", scale=64):
             render(scene, camera, support=("depth", "normal"))
+    preset("plenoptic1-double-gauss", scale=64).rays()
     render(hall(), preset("setup1", scale=128), samples=(4, 16), error=4.0)
     render(load_scene("twins"), preset("pinhole2d", scale=32), error=2.0)
     render(hall(), preset("setup1", scale=128), samples=4, dtype="float32", audit=0.1)

@@ -14,7 +14,7 @@ from raytrace_ii.shapes.primitives import Mesh
 from raytrace_ii.tracing.kernels.media import fresnel
 from raytrace_ii.tracing.kernels.srgb import encode_srgb
 from raytrace_ii.tracing.kernels.tables import LEAST_WEIGHT
-from raytrace_ii.tracing.lift import LIFT
+from raytrace_ii.tracing.packing import LIFT
 from tests.support.trace_scenes import (
     BLACK,
     UNIFORM,

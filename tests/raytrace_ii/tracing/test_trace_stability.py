@@ -7,7 +7,7 @@ import pytest
 
 from raytrace_ii import Background, Body, Light, Material, Scene, trace
 from raytrace_ii.shapes.primitives import Mesh, rotation
-from raytrace_ii.tracing.lift import LIFT
+from raytrace_ii.tracing.packing import LIFT
 from tests.support.trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, sphere, spread, sun, wall
 
 LIGHT = np.array([0.5, 0.7, -0.4]) / np.linalg.norm([0.5, 0.7, -0.4])
