@@ -1,7 +1,8 @@
 """Lens files of Zemax OpticStudio, ``.zmx``: surfaces, glasses, stop, rims and the primary wavelength.
 
 The files are lines of words, in UTF-8 or UTF-16. A block of indented lines belongs to the ``SURF`` line before it.
-Surface 0 is the object, the last one the image. ``DIAM`` holds half a diameter. ``GLAS`` holds a name, the kind of
+Surface 0 is the object, the last one the image. ``DIAM`` holds half a diameter; many files leave out that of the
+stop and have the entrance pupil's diameter (``ENPD``) or the f-number (``FNUM``). ``GLAS`` holds a name, the kind of
 solve, the surface of a pickup, index and Abbe number; the latter two are placeholders unless the glass is a model.
 """
 
@@ -12,7 +13,7 @@ import os
 from typing import Any
 
 from ..base.files import MAX_TEXT, check_file
-from .glass import PREFIX, catalogue, known_glass
+from .glass import LINE_D_NM, PREFIX, catalogue, glass, known_glass
 from .surfaces import MOST_ASPHERIC
 
 UNITS_MM = {"MM": 1.0, "CM": 10.0, "IN": 25.4, "METER": 1000.0}
@@ -33,7 +34,7 @@ def read_zmx(path: str | os.PathLike[str]) -> dict[str, Any]:
     ------
     ValueError
         If the file is none of Zemax's, or has mirrors, tilts, surfaces that are neither conics nor even aspheres, an
-        unknown unit, an unknown glass, or a gap of no length.
+        unknown unit, an unknown glass, a gap of no length, or a stop without a size.
     OSError
         If the file is missing.
     """
@@ -63,6 +64,9 @@ def read_zmx(path: str | os.PathLike[str]) -> dict[str, Any]:
     dropped_back = kept[-1]["thickness_mm"]
     kept[-1]["thickness_mm"] = 0.0
     wavelength = _wavelength_nm(head)
+    for surface in kept:
+        if surface["stop"] and surface["diameter_mm"] is None:
+            surface["diameter_mm"] = _stop_mm(head, kept, UNITS_MM[unit], wavelength or LINE_D_NM)
     return {
         "about": " ".join(head.get("NAME", [])),
         "source": os.path.basename(os.fspath(path)),
@@ -70,6 +74,28 @@ def read_zmx(path: str | os.PathLike[str]) -> dict[str, Any]:
         "surfaces": [{key: value for key, value in surface.items() if value is not None} for surface in kept],
         **({} if wavelength is None else {"wavelength_nm": wavelength}),
     }
+
+
+def _stop_mm(
+    head: dict[str, list[str]], surfaces: list[dict[str, Any]], unit_mm: float, wavelength_nm: float
+) -> float:
+    """Return the diameter of a stop without a rim: where the paraxial ray parallel to the axis meets it that enters
+    at the edge of the entrance pupil."""
+    height, slope, index, at_stop = 1.0, 0.0, 1.0, 0.0
+    for surface in surfaces:
+        at_stop = height if surface["stop"] else at_stop
+        made = glass(surface["glass"])
+        after = 1.0 if made is None else made.index(wavelength_nm)
+        curvature = 1 / (surface["radius_mm"] or math.inf) + 2 * (surface["aspheric"] or [0.0])[0]
+        slope = (index * slope - height * (after - index) * curvature) / after
+        height, index = height + slope * surface["thickness_mm"], after
+    for key, power in ("ENPD", 1.0), ("FNUM", abs(slope)):
+        if key in head:
+            pupil = _number(key, head[key])
+            if not (0 < pupil < math.inf and power and at_stop):
+                raise ValueError(f"{key} is {pupil:g}: the stop of no DIAM has no diameter from it")
+            return 2 * abs(at_stop) * (pupil * unit_mm / 2 if key == "ENPD" else 1 / power / pupil / 2)
+    raise ValueError("the stop has no DIAM, and the file no ENPD or FNUM: one of them is needed")
 
 
 def _text(path: str | os.PathLike[str]) -> str:
@@ -117,11 +143,12 @@ def _surface(
     named = f"surface {index}"
     if kind not in KNOWN_TYPES:
         raise ValueError(f"{named} is of type {kind}: {' and '.join(KNOWN_TYPES)} are read")
-    if "MIRR" in block and block["MIRR"] and block["MIRR"][0] not in ("0", "2"):
-        raise ValueError(f"{named} is a mirror: refracting surfaces are read")
     curvature = _number(named, block.get("CURV", ["0"]))
     thickness = _number(named, block.get("DISZ", ["0"]))
     diameter = _number(named, block.get("DIAM", ["0"]))
+    mirror = block.get("MIRR", ["0"])[:1] not in ([], ["0"], ["2"]) or block.get("GLAS", [""])[:1] == ["MIRROR"]
+    if mirror:
+        raise ValueError(f"{named} is a mirror: refracting surfaces are read")
     if index and not (math.isfinite(thickness) and thickness >= 0):
         raise ValueError(f"{named}: thickness is {thickness:g}: a distance of at least 0 is needed")
     return {
@@ -154,8 +181,6 @@ def _glass(named: str, words: list[str], before: list[dict[str, Any]], catalogue
         If the catalogue has no such glass, a model glass has another glass's name, or a pickup has no source.
     """
     name, solve, source = (*words[:3], *["", FIXED, "0"][len(words) :])
-    if name == "MIRROR":
-        raise ValueError(f"{named} is a mirror: refracting surfaces are read")
     if solve == MODEL:
         return _model(named, name, words)
     if solve == PICKUP:

@@ -662,6 +662,7 @@ def test_zemax_glass_by_its_index_and_planes_of_air(tmp_path):
         ),
         (("SURF 0\n", "SURF 0\n  GLAS F2 0 0 1.5 40\n"), "surface 0, the object, has glass: a lens in air"),
         (("UNIT MM", "UNIT FURLONG"), "unit 'FURLONG'"),
+        (("DISZ 4.75041", "GLAS MIRROR\n  DISZ -4.75041"), "surface 4 is a mirror"),
         (("DISZ 4.75041", "DISZ -4.75041"), "surface 4: thickness is -4.75"),
         (("DISZ 4.75041", "DISZ INFINITY"), "surface 4: thickness is inf"),
         (("  STOP\n", ""), "no surface is the stop"),
@@ -675,6 +676,33 @@ def test_wrong_zemax_files_are_one_clear_line(tmp_path, change, message):
     with pytest.raises(ValueError, match=message) as error:
         lens(path)
     assert str(path) in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("unit", "line", "diameter"), [("MM", "ENPD 10.0", 8.0), ("MM", "FNUM 5.0 0", 16.0), ("CM", "ENPD 1.0", 8.0)]
+)
+def test_a_zemax_stop_without_a_rim_has_that_of_the_entrance_pupil(tmp_path, unit, line, diameter):
+    """20 mm behind a plano-convex lens of f = 100 mm, whose last vertex the parallel rays reach as they came."""
+    mm = {"MM": 1, "CM": 10}[unit]
+    lines = [
+        f"UNIT {unit}",
+        line,
+        "SURF 0",
+        "  DISZ INFINITY",
+        "SURF 1",
+        f"  DISZ {4 / mm}",
+        "  GLAS ___BLANK 1 0 1.5",
+    ]
+    lines += ["SURF 2", f"  CURV {-mm / 50}", f"  DISZ {20 / mm}", "SURF 3", "  STOP", f"  DISZ {80 / mm}", "SURF 4"]
+    path = tmp_path / "lens.zmx"
+    path.write_text("\n".join(lines))
+    found = lens(path)
+    assert found.at(0.0).focal_mm == pytest.approx(100)
+    assert [s.diameter_mm for s in found.surfaces] == [None, None, pytest.approx(diameter)]
+    for other, said in ("", "no DIAM, and the file no ENPD or FNUM"), ("ENPD 0", "ENPD is 0: the stop of no DIAM"):
+        path.write_text("\n".join(lines).replace(line, other))
+        with pytest.raises(ValueError, match=said):
+            lens(path)
 
 
 @pytest.mark.parametrize("placeholder", ["1.5 40", "1.5168 64.17", ""])
