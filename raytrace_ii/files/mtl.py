@@ -78,6 +78,9 @@ def _material(where: str, lines: list[str], folder: Path, note: Note) -> Materia
             picture = _picture(f"{where}: {word}", rest, folder, note)
         elif key and key not in _SILENT:
             note(f"MTL {word}")
+    if values.get("tr") == 1 and "d" not in values and not _is_glass(values):
+        note("Tr 1, by which MeshLab means opaque")
+        values["d"] = 1.0
     gone = share(1 - values["d"] if "d" in values else values.get("tr", 0.0))  # files with both mean d
     if not 0 <= gone <= 1:
         raise ValueError(f"{where}: d or Tr leaves {gone:g} to go through: a share from 0 to 1 is needed")
@@ -95,6 +98,11 @@ def _material(where: str, lines: list[str], folder: Path, note: Note) -> Materia
         ior=values.get("ni", 1.0),
         emission=values.get("ke", (0.0, 0.0, 0.0)),
     )
+
+
+def _is_glass(values: dict[str, Any]) -> bool:
+    """Whether a material that lets all light through colours it, bends it, or asks for transparency by its model."""
+    return "tf" in values or values.get("ni", 1.0) != 1 or values.get("illum") in (4, 6, 7, 9)
 
 
 def _numbers(where: str, text: str) -> NDArray[np.float64]:

@@ -82,6 +82,8 @@ class GltfFile:
             raise ValueError(f"{where}: unknown type {a.type!r}: known are {', '.join(_SHAPES)}")
         kind, width = _component(a.componentType, where), _SHAPES[a.type]
         if a.bufferView is None:  # zeros, which sparse values may replace
+            if not a.sparse and "KHR_draco_mesh_compression" in self.tables.extensionsUsed:
+                raise ValueError(f"{where}: its values are compressed by Draco alone: {_advice(DECODE)}")
             if a.count > MOST_ROWS:
                 raise ValueError(f"{where}: {a.count} rows of zeros: at most {MOST_ROWS} are made up")
             values = np.zeros((a.count, width), kind)

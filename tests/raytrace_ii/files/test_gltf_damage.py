@@ -138,6 +138,16 @@ def test_faults_are_named_with_their_place(path, value, says, tmp_path):
     assert message.startswith("m.gltf: ") and says in message and "\n" not in message, message
 
 
+def test_values_that_draco_alone_holds_are_named(tmp_path):
+    """A file that uses Draco and does not say that it is required: a box of glTF-Transform's had no area."""
+    file = good().save(tmp_path / "m.gltf")
+    tables = json.loads(file.read_text())
+    del tables["accessors"][0]["bufferView"]
+    file.write_text(json.dumps({**tables, "extensionsUsed": ["KHR_draco_mesh_compression"]}))
+    with pytest.raises(ValueError, match=r"accessors.0: its values are compressed by Draco alone"):
+        load_scene(file)
+
+
 def test_values_that_are_not_finite_are_refused(tmp_path):
     gltf = Gltf()
     gltf.node(mesh=gltf.mesh(np.array(SQUARE) * [np.nan, 1, 1], SQUARE_FACES))
