@@ -95,14 +95,14 @@ def _material(where: str, lines: list[str], folder: Path, note: Note) -> Materia
         shininess=values.get("ns", 0.0) or 50.0,
         mirror=mirror,
         transmission=(red, green, blue),
-        ior=values.get("ni", 1.0),
+        ior=values.get("ni") or 1.0,  # 0 stands for no index: ours is above 0
         emission=values.get("ke", (0.0, 0.0, 0.0)),
     )
 
 
 def _is_glass(values: dict[str, Any]) -> bool:
     """Whether a material that lets all light through colours it, bends it, or asks for transparency by its model."""
-    return "tf" in values or values.get("ni", 1.0) != 1 or values.get("illum") in (4, 6, 7, 9)
+    return "tf" in values or values.get("ni", 1.0) not in (0, 1) or values.get("illum") in (4, 6, 7, 9)
 
 
 def _numbers(where: str, text: str) -> NDArray[np.float64]:
