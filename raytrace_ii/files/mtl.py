@@ -75,7 +75,7 @@ def _material(where: str, lines: list[str], folder: Path, note: Note) -> Materia
         elif key in ("ns", "ni", "d", "tr", "illum"):
             values[key] = _number(f"{where}: {word}", rest)
         elif key == "map_kd":
-            picture = _picture(f"{where}: {word}", rest, folder, note)
+            picture = picture_of_map(f"{where}: {word}", rest, folder, note)
         elif key and key not in _SILENT:
             note(f"MTL {word}")
     if values.get("tr") == 1 and "d" not in values and not _is_glass(values):
@@ -128,7 +128,7 @@ def _colour(where: str, text: str) -> Vector:
     return r, g, b
 
 
-def _picture(where: str, text: str, folder: Path, note: Note) -> Image | None:
+def picture_of_map(where: str, text: str, folder: Path, note: Note) -> Image | None:
     """The image of a map; its options are left out. None if there is no such file beside the material's."""
     if text.startswith("-"):
         note(f"MTL options of map_Kd: {text.split()[0]}")

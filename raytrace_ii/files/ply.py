@@ -1,4 +1,4 @@
-"""PLY files, ASCII and binary: polygons, triangle strips and vertex properties."""
+"""PLY files, ASCII and binary: polygons, triangle strips, vertex properties, and MeshLab's picture on the faces."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from ..scene.textures import VertexColours, linear
 from .beside import read_bytes
 from .corners import Table, joined
 from .mesh_model import Model, Part
-from .ply_elements import Column, Columns, read_columns
+from .mtl import picture_of_map
+from .ply_elements import Column, Columns, read_columns, texture_files
 from .polygons import triangulated
 
 Array = NDArray[np.float64]
@@ -32,7 +33,8 @@ def read_ply(path: Path) -> Model:
     OSError
         If it cannot be read.
     """
-    elements, columns = read_columns(read_bytes(path))
+    data = read_bytes(path)
+    elements, columns = read_columns(data)
     notes = [f"element {name}" for name in columns if name not in ("vertex", "face", "tristrips", "material")]
     vertex = columns.get("vertex", {})
     places = _stacked(vertex, ("x", "y", "z"))
@@ -40,24 +42,37 @@ def read_ply(path: Path) -> Model:
         raise ValueError("has no element vertex with x, y and z")
     if not np.isfinite(places).all():
         raise ValueError("holds vertices that are not finite numbers")
-    faces = _faces(columns, places)
+    faces, uv = _faces(columns, places)
     normals = _stacked(vertex, ("nx", "ny", "nz"))
     if normals is not None:
         normals = np.where(np.isfinite(normals), normals, 0)
-    uv = next((found for names in UV if (found := _stacked(vertex, names)) is not None), None)
-    if "texcoord" in columns.get("face", {}) and uv is None:
+    own = next((found for names in UV if (found := _stacked(vertex, names)) is not None), None)
+    uv = uv if own is None else Table(own, faces)
+    if uv is None and "texcoord" in columns.get("face", {}):
         notes.append("texture coordinates of faces")
     colours = _stacked(vertex, ("red", "green", "blue"))
     if colours is not None:  # sRGB by custom: of whole numbers to 255, of others to 1
         kind = next(p.kind for e in elements if e.name == "vertex" for p in e.properties if p.name == "red")
         peak = np.iinfo(kind).max if kind.kind in "iu" else 1
         colours = linear(np.clip(np.nan_to_num(colours) / peak, 0, 1))
-    mesh = joined(
-        places, faces, colours=colours,
-        normals=None if normals is None else Table(normals, faces), uv=None if uv is None else Table(uv, faces),
-    )  # fmt: skip
-    material = Material(colour=(1.0, 1.0, 1.0), texture=VertexColours()) if colours is not None else None
+    image = None
+    for name in texture_files(data)[:1] if uv is not None else ():
+        image = picture_of_map("TextureFile", name, path.parent, notes.append)
+    if _more_pictures(columns.get("face", {})):
+        notes.append("pictures but the first")
+    if image is not None and colours is not None:
+        notes.append("vertex colours under a picture")
+        colours = None
+    mesh = joined(places, faces, colours=colours, normals=None if normals is None else Table(normals, faces), uv=uv)
+    texture = image if image is not None else VertexColours() if colours is not None else None
+    material = None if texture is None else Material(colour=(1.0, 1.0, 1.0), texture=texture)
     return Model([Part("", mesh, material)], left_out=list(dict.fromkeys(notes)))
+
+
+def _more_pictures(face: dict[str, Column]) -> bool:
+    """Whether faces have another picture than the first, which all are given."""
+    numbers = face.get("texnumber")
+    return isinstance(numbers, np.ndarray) and bool((numbers > 0).any())
 
 
 def _stacked(columns: dict[str, Column], names: tuple[str, ...]) -> Array | None:
@@ -68,20 +83,38 @@ def _stacked(columns: dict[str, Column], names: tuple[str, ...]) -> Array | None
     return np.column_stack(found)  # type: ignore[arg-type]
 
 
-def _faces(columns: Columns, places: Array) -> Rows:
-    """Triangles (T, 3) of polygons and strips."""
-    found = [np.empty((0, 3), np.int64)]
-    corners, counts = _lists(columns.get("face", {}), len(places))
+def _faces(columns: Columns, places: Array) -> tuple[Rows, Table | None]:
+    """Triangles (T, 3) of polygons and strips, and (u, v) of their corners if all faces have those of their own."""
+    found, uv = [np.empty((0, 3), np.int64)], None
+    face = columns.get("face", {})
+    corners, counts = _lists(face, len(places))
+    values = _coordinates(face, counts)
     if len(counts) and counts.min() < 3:
         kept = counts >= 3  # points and lines
-        corners, counts = corners[np.repeat(kept, counts)], counts[kept]
+        of_kept = np.repeat(kept, counts)
+        corners, counts, values = corners[of_kept], counts[kept], None if values is None else values[of_kept]
     if len(counts):
-        found.append(corners[triangulated(places[corners], counts)])
+        triangles = triangulated(places[corners], counts)
+        found.append(corners[triangles])
+        uv = None if values is None else Table(values, triangles)
     for strip in _strips(*_lists(columns.get("tristrips", {}), len(places), ends=True)):
         triangles = np.column_stack([strip[:-2], strip[1:-1], strip[2:]])
         triangles[1::2] = triangles[1::2, [1, 0, 2]]  # every other one is turned over
         found.append(triangles)
-    return np.concatenate(found)
+        uv = None
+    return np.concatenate(found), uv
+
+
+def _coordinates(face: dict[str, Column], counts: Rows) -> Array | None:
+    """(u, v) of the corners of all faces one after another; None unless each face has two numbers a corner."""
+    column = face.get("texcoord")
+    if column is None or not len(counts):
+        return None
+    rows = np.array([len(row) for row in column])
+    if not np.array_equal(rows, 2 * counts):
+        return None
+    values = np.concatenate(column) if isinstance(column, list) else column
+    return np.nan_to_num(values.reshape(-1, 2))
 
 
 def _strips(corners: Rows, counts: Rows) -> Iterator[Rows]:

@@ -41,6 +41,13 @@ class Element:
     properties: list[Property]
 
 
+def texture_files(data: bytes) -> list[str]:
+    """Names of pictures in the comments of a header, as MeshLab and others write them."""
+    lines = data[: data.find(b"end_header", 0, MOST_HEADER)].decode("utf-8", "replace").splitlines()
+    words = [line.split(maxsplit=2) for line in lines]
+    return [line[2].strip() for line in words if len(line) == 3 and line[:2] == ["comment", "TextureFile"]]
+
+
 def read_columns(data: bytes) -> tuple[list[Element], Columns]:
     """Elements of a PLY file and their columns by name: (n,), a list (n, length) or n arrays of their own lengths.
 

@@ -221,3 +221,59 @@ def test_a_file_without_materials_has_the_default_grey(tmp_path):
     trimesh.creation.box((2, 2, 2)).export(tmp_path / "b.stl")
     (tmp_path / "s.toml").write_text('ambient = 1\n[[object]]\nmesh = "b.stl"\n')
     np.testing.assert_allclose(load_scene(tmp_path / "s.toml").bodies[0].material.colour, 0.8)
+
+
+PLY = """ply
+format ascii 1.0
+comment TextureFile my maps.png
+element vertex 5
+property float x
+property float y
+property float z
+element face 3
+property list uchar int vertex_indices
+property list uchar float texcoord
+property uchar texnumber
+end_header
+0 0 0
+2 0 0
+2 1 0
+0 1 0
+3 0 0
+4 0 1 2 3 8 0 0 1 0 1 1 0 1 0
+2 1 2 4 0 0 1 1 0
+3 1 4 2 6 0.5 0.5 0.5 0.5 0.5 0.5 0
+"""
+
+
+def test_meshlabs_picture_on_the_faces_of_a_ply(tmp_path):
+    """Of trimesh's models, `fuze.ply` has the look of `fuze.obj`; a line between the faces has no corners here."""
+    codes = np.array([[[250, 0, 0], [0, 250, 0]], [[0, 0, 250], [250, 0, 0]]], np.uint8)
+    write_image(tmp_path / "my maps.png", codes)
+    (tmp_path / "a.ply").write_text(PLY)
+    (part,) = read_model(tmp_path / "a.ply").parts
+    assert part.material.colour == (1, 1, 1) and len(part.material.texture.pixels) == 2
+    found = dict(zip(map(tuple, part.mesh.vertices * [1, 1, -1]), part.mesh.uv.tolist(), strict=True))
+    assert len(part.mesh.vertices) == 7, "two corners have two (u, v)"
+    assert found[0, 0, 0] == [0, 0] and found[0, 1, 0] == [0, 1]
+    (tmp_path / "s.toml").write_text('ambient = 1\n[[object]]\nname = "a"\nmesh = "a.ply"\n')
+    places = np.array([(0.4, 0.2, -9), (1.6, 0.2, -9), (0.4, 0.8, -9), (1.6, 0.8, -9)])
+    seen = trace(load_scene(tmp_path / "s.toml"), places, np.tile([0.0, 0, 1], (4, 1))).radiance
+    assert seen.argmax(axis=1).tolist() == [2, 0, 0, 1], "blue, red; red, green: rows of a picture run down"
+
+
+@pytest.mark.parametrize(
+    ("change", "notes"),
+    [
+        (("comment TextureFile my maps.png\n", ""), []),
+        (("my maps.png", "other.png"), ["TextureFile other.png (not there)"]),
+        (("8 0 0 1 0 1 1 0 1 0", "6 0 0 1 0 1 1 0"), ["texture coordinates of faces"]),
+        (("0.5 0\n", "0.5 1\n"), ["pictures but the first"]),
+    ],
+)
+def test_what_of_a_plys_picture_is_left_out(tmp_path, change, notes):
+    write_image(tmp_path / "my maps.png", np.zeros((2, 2, 3), np.uint8))
+    (tmp_path / "a.ply").write_text(PLY.replace(*change))
+    model = read_model(tmp_path / "a.ply")
+    assert model.left_out == notes
+    assert (model.parts[0].material is None) == (notes != ["pictures but the first"])
