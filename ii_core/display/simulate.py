@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.checks import view_size
 from ..camera.camera import IICamera, Pair
+from ..picture.assumed import ASSUMED, shown_pitch_mm
 from ..picture.picture import IIPicture, codes8
 from ..picture.view import camera_of, lens_array_mm, view_positions
 
@@ -40,7 +41,7 @@ def display_simulation(
         raise ValueError(f"fill is {fill}: a share from 0 to 1 is needed")
     x, y = view_positions(camera, viewpoint_mm, erect=picture.erect)
     spot = _spots(camera, np.asarray(viewpoint_mm, np.float64) - camera.origin_mm, (width, height))
-    (k, l), pitch = picture.lenses, camera.lens_pitch_mm
+    (k, l), pitch = picture.lenses, shown_pitch_mm(camera)
     wide, high = lens_array_mm(camera)
     across = (spot[..., 0] + wide / 2) / pitch[0]
     down = (high / 2 - spot[..., 1]) / pitch[1]
@@ -62,9 +63,8 @@ def _spots(camera: IICamera, eye: NDArray[np.float64], size: Pair) -> NDArray[np
     right = np.cross([0.0, 1.0, 0.0], ahead)
     right /= np.linalg.norm(right)
     up = np.cross(ahead, right)
-    corners = np.array([[x, y, camera.gap_mm] for x in (-1, 1) for y in (-1, 1)]) * [
-        camera.size_mm[0] / 2, camera.size_mm[1] / 2, 1,
-    ] - eye  # fmt: skip
+    wide, high = lens_array_mm(camera) if camera.name == ASSUMED else camera.size_mm
+    corners = np.array([[x, y, camera.gap_mm] for x in (-1, 1) for y in (-1, 1)]) * [wide / 2, high / 2, 1] - eye
     tangents = np.abs(np.stack([corners @ right, corners @ up]) / (corners @ ahead))
     scale = max(tangents[0].max() / size[0], tangents[1].max() / size[1]) * 2
     x = (np.arange(size[0]) + 0.5 - size[0] / 2) * scale

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import checks
 from ..camera.camera import IICamera
+from .assumed import ASSUMED, parallax_down, shown_pitch_mm
 from .component import picture_pixels, sub_images
 from .picture import IIPicture
 
@@ -92,23 +93,24 @@ def view_positions(
     e = e - camera.origin_mm
     (k, l), (u, v) = camera.lenses, camera.ei_pixels
     sign = -1.0 if erect else 1.0
-    width, height = lens_array_mm(camera)
-    lens_x = (np.arange(k) + 0.5) * camera.lens_pitch_mm[0] - width / 2
-    lens_y = height / 2 - (np.arange(l) + 0.5) * camera.lens_pitch_mm[1]
+    (width, height), (pitch_x, pitch_y), down = lens_array_mm(camera), shown_pitch_mm(camera), parallax_down(camera)
+    lens_x = (np.arange(k) + 0.5) * pitch_x - width / 2
+    lens_y = height / 2 - (np.arange(l) + 0.5) * pitch_y
     to_pixels = sign * camera.gap_mm / ((camera.gap_mm - e[2]) * camera.pixel_pitch_mm)
     x = np.arange(k) * u + (u - 1) / 2 - (lens_x - e[0]) * to_pixels
-    y = np.arange(l) * v + (v - 1) / 2 + (lens_y - e[1]) * to_pixels * camera.lens_model.vertical_parallax
+    y = np.arange(l) * v + (v - 1) / 2 + (lens_y - e[1]) * to_pixels * down
     if camera.viewer_mm is not None:  # elementary images stand beside their lenses
         aside = sign * camera.gap_mm / (camera.viewer_mm * camera.pixel_pitch_mm)
-        x, y = x + lens_x * aside, y - lens_y * aside * camera.lens_model.vertical_parallax
+        x, y = x + lens_x * aside, y - lens_y * aside * down
     return x, y
 
 
 def lens_array_mm(camera: IICamera) -> tuple[float, float]:
     """Width and height of the lens array of a regular structure."""
-    if camera.viewer_mm is None:
+    if camera.viewer_mm is None and camera.name != ASSUMED:
         return camera.size_mm
-    return camera.lenses[0] * camera.lens_pitch_mm[0], camera.lenses[1] * camera.lens_pitch_mm[1]
+    across, down = shown_pitch_mm(camera)
+    return camera.lenses[0] * across, camera.lenses[1] * down
 
 
 @checks.checked(camera=checks.instance(IICamera))
@@ -125,7 +127,7 @@ def five_viewpoints(camera: IICamera) -> dict[str, NDArray[np.float64]]:
     (width, height), (pitch_x, pitch_y) = lens_array_mm(camera), camera.ei_pitch_mm
     gap, meeting = camera.gap_mm, 0.0 if camera.viewer_mm is None else 1 / camera.viewer_mm
     tan_x, tan_y = pitch_x / 2 / gap, pitch_y / 2 / gap
-    r = camera.viewer_mm or 3 * max(width / 2 / tan_x, height / 2 / tan_y)
+    r = camera.viewer_mm or 3 * max(width / 2 / tan_x, height / 2 / tan_y * parallax_down(camera))
     # A lens at the far edge, W/2, sees its own EI while (W/2 + r·sin φ) / (r·cos φ) ≤ tan + W/2d.
     inside_x = tan_x - 0.5 * camera.pixel_pitch_mm / gap + width / 2 * meeting
     inside_y = tan_y - 0.5 * camera.pixel_pitch_mm / gap + height / 2 * meeting
@@ -220,10 +222,11 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
     beyond = depth_mm - camera.origin_mm[2] - camera.gap_mm
     per_step = sign * camera.pixel_pitch_mm * beyond / camera.gap_mm / widening(camera, beyond)
     total, weight = np.zeros((rows, cols, 3)), np.zeros((rows, cols, 1))
+    pitch_x, pitch_y = shown_pitch_mm(camera)
     for v in range(v_count):
-        i0, i1, di, in_y = _shifted(rows, (v - (v_count - 1) / 2) * per_step / camera.lens_pitch_mm[1])
+        i0, i1, di, in_y = _shifted(rows, (v - (v_count - 1) / 2) * per_step / pitch_y)
         for u in range(u_count):
-            j0, j1, dj, in_x = _shifted(cols, (u - (u_count - 1) / 2) * per_step / camera.lens_pitch_mm[0])
+            j0, j1, dj, in_x = _shifted(cols, (u - (u_count - 1) / 2) * per_step / pitch_x)
             si = stack[v, u]
             value = _mix(_mix(si[i0][:, j0], si[i0][:, j1], dj), _mix(si[i1][:, j0], si[i1][:, j1], dj), di[:, None])
             seen = (in_y[:, None] & in_x[None, :])[..., None]

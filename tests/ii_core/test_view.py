@@ -21,7 +21,9 @@ from ii_core import (
     view_image,
 )
 from ii_core.camera.optics import Grin
-from ii_core.picture.view import view_positions
+from ii_core.formats.quilt import quilt_path
+from ii_core.picture.assumed import with_assumed_camera
+from ii_core.picture.view import lens_array_mm, view_positions
 
 CAMERA = IICamera(pixels=(42, 30), lenses=(7, 5), pixel_pitch_mm=0.25, gap_mm=2.0)  # 6×6 px under each lens
 VIEWPOINTS = [
@@ -336,3 +338,30 @@ def test_disparity_and_the_meeting_of_zones_are_those_of_the_rays(optics, viewer
         step = np.diff(seen_under) * (1 if camera.erect else -1)
         np.testing.assert_allclose(disparity_of_depth(camera, z), step, atol=1e-9)
         assert depth_of_disparity(camera, disparity_of_depth(camera, z)) == pytest.approx(z)
+
+
+def field_of(plane, views, step):
+    """A bare picture of (across, down) views of a far plane, which moves by whole pixels from view to view."""
+    across, down = views
+    stack = [[np.roll(plane, (step * v, step * u), (0, 1)) for u in range(across)] for v in range(down)]
+    pixels = np.array(stack).transpose(2, 0, 3, 1, 4)
+    (l, v, k, u, _) = pixels.shape
+    return IIPicture(pixels.reshape(l * v, k * u, 3), (k, l), (u, v))
+
+
+@pytest.mark.parametrize("views", [(5, 1), (5, 3), (3, 5)])
+def test_an_assumed_camera_shows_square_pixels_as_far_apart_down_as_across(views):
+    """A quilt of others, 32×1 views of 512×256 px, was shown 64 times as wide as high and written as `a64`."""
+    plane = np.random.default_rng(0).integers(0, 256, (24, 32, 3)).astype(np.uint8)
+    picture = with_assumed_camera(field_of(plane, views, 1))
+    camera = picture.camera
+    width, height = lens_array_mm(camera)
+    assert width / height == pytest.approx(32 / 24)
+    assert quilt_path("a.png", picture).name.endswith(f"a{32 / 24:.6g}.png")
+    depth = float(depth_of_disparity(camera, -1.0))
+    middle = np.roll(plane, (views[1] // 2, views[0] // 2), (0, 1))
+    np.testing.assert_allclose(refocus(picture, depth)[4:-4, 4:-4], middle[4:-4, 4:-4], atol=1e-3)
+    np.testing.assert_array_equal(view_image(picture, (0, 0, -1e9))[0], middle)
+    at = five_viewpoints(camera)
+    assert all(view_image(picture, place)[1].all() for place in at.values())
+    assert (np.ptp(view_positions(camera, at["up"])[1] % views[1]) == 0) == (views[1] == 1)
