@@ -38,6 +38,8 @@ MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of c
 # The range of disparities: at most WIDEST of the longer side of a view; found in views of at most SEARCH_SIDE px, at
 # MANY pixels whose costs within NOISE 8-bit codes of the least span less than VALLEY px.
 WIDEST, SEARCH_SIDE, MANY, NOISE, VALLEY = 0.75, 128, 16, 4.0, 2.0
+# Nearest depth, as a share of the way from the cameras to where their views agree, which may be as good as infinite.
+NEAREST = 1e-9
 # Gauss–Newton: differences of occluded views, 8-bit codes; window of planes, px; likeness in codes and disparity;
 # weight of the old disparity, codes² a px²; weight of level planes over that of the data; longest step, px.
 STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 6, 6.0, 5, 20.0, 0.1, 1000.0, 0.2, 0.3
@@ -298,7 +300,7 @@ def possible(camera: IICamera | None, most: float) -> tuple[float, float]:
     infinity = float(disparity_of_depth(camera, base + FARTHEST * camera.viewer_mm))
     near = first_mm(camera)
     with np.errstate(divide="ignore"):
-        nearest = float(disparity_of_depth(camera, near + 1e-3 * (base - near))) if near < base else most
+        nearest = float(disparity_of_depth(camera, near + NEAREST * (base - near))) if near < base else most
     return max(-most, infinity), min(most, nearest)
 
 

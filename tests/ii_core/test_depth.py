@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from ii_core import IICamera, IIPicture, depth_of_disparity, estimate_depth
+from ii_core import IICamera, IIPicture, Rig, depth_of_disparity, disparity_of_depth, estimate_depth
 from ii_core.base.colour import srgb
 from ii_core.base.jit import lean_kernel
 from ii_core.camera.optics import Lens
@@ -211,6 +211,17 @@ def test_a_nominal_camera_does_not_limit_the_range():
     picture, truth = slanted(views=(5, 5), size=(64, 48), at=1.0)
     low, high = field_range(with_assumed_camera(picture))
     assert low < truth.min() < truth.max() < high
+
+
+@pytest.mark.parametrize("focus_mm", [None, 400.0])
+def test_an_array_of_cameras_sees_near_things_wherever_its_views_agree(focus_mm):
+    """27×27 rendered cameras that agree at infinity: things at 3 to 12 m were searched beyond 250 m."""
+    camera = Rig(baseline_mm=10, focal_mm=30, sensor_mm=36, focus_mm=focus_mm).camera((5, 5), (64, 48))
+    z = 300.0
+    picture, truth = slanted(views=(5, 5), size=(64, 48), at=float(disparity_of_depth(camera, z)), slope=0.0)
+    found = estimate_depth(replace(picture, camera=camera))
+    assert np.median(np.abs(found.disparity - truth)) < 0.02
+    assert np.median(found.depth_mm) == pytest.approx(z, rel=0.03)
 
 
 @pytest.mark.parametrize("lens", [{"both_sides": True}, {"optics": [Lens(z_mm=70.0, focal_mm=50.0)]}])

@@ -121,7 +121,7 @@ class Field:
             loop_filter.code_filter(coder, self.filters, job.at, same, self._own_taps())
         if self.header.exact:
             exact = self._exact
-            rotation, sixteen = self.header.colours, exact.pixels.itemsize == 2
+            rotation, sixteen = np.ascontiguousarray(self.header.colours), exact.pixels.itemsize == 2
             exact.pixels[:] = self.pixels[job.at]
             prepare(exact, self.views, job.at, rotation, sixteen)
             code_exact(coder, exact)

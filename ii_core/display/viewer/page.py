@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ...base.files import atomic_path
+from ...camera.camera import IICamera
 from ...picture.assumed import ASSUMED, parallax_down, shown_pitch_mm, with_assumed_camera
 from ...picture.picture import IIPicture, codes8
 from ...picture.view import camera_of, five_viewpoints, lens_array_mm, view_image
@@ -37,6 +38,7 @@ MAX_EMBEDDED = 256 << 20  # bytes of a page; browsers read no more in reasonable
 CARD_BYTES = 512 << 20  # budget for frames of a take on the graphics card, which holds at least two
 JPEG_QUALITY = 95
 FARTHEST = 250  # depth of the farthest focus, in gaps
+MOST_SHIFT = 4.0  # lenses a pixel: range of focus without a camera, half of that of an array of cameras
 SCRIPTS = ("lightfield.js", "take.js", "viewer.js")
 TAKE_FILE = "take.pages"  # file in a folder with the pages of all frames of a take; browsers request parts of it
 Rows = Sequence[tuple[str, str]]
@@ -231,7 +233,6 @@ class _Page:
         assumed = camera.name == ASSUMED
         front, left, up = (five_viewpoints(camera)[name] for name in ("front", "left", "up"))
         plane = camera.origin_mm[2] + camera.gap_mm
-        far = 4.0 if assumed else (FARTHEST - 1) * camera.pixel_pitch_mm / camera.lens_pitch_mm[0]
         return {
             "name": self.title,
             "lenses": list(picture.lenses),
@@ -245,8 +246,9 @@ class _Page:
             "fps": self.videos[0].fps,
             "card_bytes": CARD_BYTES,
             "labels": list(self.labels),
-            "focus": [-far if assumed else -far / 4, far] if u > 1 else [-1, 1],
+            "focus": list(_focus(camera)) if u > 1 else [-1, 1],
             "camera": {
+                "origin_mm": camera.origin_mm[2],
                 "gap_mm": camera.gap_mm,
                 "pixel_pitch_mm": camera.pixel_pitch_mm,
                 "lens_pitch_mm": list(shown_pitch_mm(camera)),
@@ -345,3 +347,14 @@ def depth_view(picture: IIPicture, depth: NDArray[Any]) -> NDArray[np.float32]:
     """Return the depth map of the sub-image in the middle, (L, K)."""
     u, v = picture.ei_pixels
     return np.asarray(depth[v // 2 :: v, u // 2 :: u], np.float32)
+
+
+def _focus(camera: IICamera) -> tuple[float, float]:
+    """Return the range of focus, lenses a pixel: negative before the lens plane."""
+    if camera.name == ASSUMED:
+        return -MOST_SHIFT, MOST_SHIFT
+    per_mm = camera.pixel_pitch_mm / (camera.gap_mm * camera.lens_pitch_mm[0])
+    if camera.start_mm and camera.viewer_mm is not None:  # cameras, whose views may agree at any distance
+        return -2 * MOST_SHIFT, min(2 * MOST_SHIFT, 0.999 * per_mm * camera.viewer_mm)
+    far = (FARTHEST - 1) * per_mm * camera.gap_mm
+    return -far / 4, far

@@ -139,14 +139,20 @@ class Viewer {
     return [sign * this.state.f, c.vertical_parallax ? sign * this.state.f * c.lens_pitch_mm[0] / c.lens_pitch_mm[1] : 0];
   }
 
-  depthOf(f) {
+  // Lenses a pixel by which a plane moves from view to view, per mm beyond the lens plane.
+  perMm() {
     const c = this.meta.camera;
-    return c.gap_mm * (1 + f * c.lens_pitch_mm[0] / c.pixel_pitch_mm);
+    return c.pixel_pitch_mm / (c.gap_mm * c.lens_pitch_mm[0]);
+  }
+
+  depthOf(f) {
+    const c = this.meta.camera, beyond = f / (this.perMm() - (c.viewer_mm ? f / c.viewer_mm : 0));
+    return c.origin_mm + c.gap_mm + beyond;
   }
 
   focusOf(depth) {
-    const c = this.meta.camera;
-    return (depth / c.gap_mm - 1) * c.pixel_pitch_mm / c.lens_pitch_mm[0];
+    const c = this.meta.camera, beyond = depth - c.origin_mm - c.gap_mm;
+    return this.perMm() * beyond / (1 + (c.viewer_mm ? beyond / c.viewer_mm : 0));
   }
 
   optics(eye = 0) {
