@@ -200,7 +200,7 @@ def test_a_page_as_jpeg_shows_the_picture_nearly_and_clicks_focus_by_its_depth_m
 
 @pytest.mark.parametrize("focus_mm", [None, 500.0])
 def test_focus_of_an_array_of_cameras_reaches_near_things(opened, tmp_path, focus_mm):
-    """Of cameras that agree at infinity, the slider reached 0.006 px of disparity, and z was that of parallel zones."""
+    """Of cameras that agree at infinity, the slider reached 0.006 px of disparity, and z was wrong."""
     camera = Rig(baseline_mm=10, focal_mm=30, sensor_mm=36, focus_mm=focus_mm).camera((3, 3), (48, 32))
     write_viewer(tmp_path / "v.html", IIPicture(np.zeros((96, 144, 3), np.uint8), (48, 32), (3, 3), camera))
     tab = opened(tmp_path / "v.html")
