@@ -32,13 +32,23 @@ class Refracting(NamedTuple):
 
 
 def traced(coordinates: NDArray[np.float64], surfaces: list[Refracting]) -> NDArray[np.int16]:
-    """Trace rays (6, n) of places and directions in place, through surfaces in the order in which they meet them.
+    """Trace rays through surfaces in the order in which they meet them, and return where each is stopped.
+
+    Parameters
+    ----------
+    coordinates : ndarray of float64, (6, n)
+        Places, mm from the axis and in z, and directions of any length; replaced by those behind the last surface,
+        unit vectors. Those of stopped rays mean nothing.
+    surfaces : list of Refracting
 
     Returns
     -------
-    (n,) int16
-        How many surfaces are left, the one included, where a ray is stopped; 0 of rays that pass. Directions become
-        unit vectors; those of stopped rays mean nothing.
+    ndarray of int16, (n,)
+        Which surface stops a ray, from 1 for the last one in the list; 0 of rays that pass.
+
+    References
+    ----------
+    Welford, Aberrations of Optical Systems, 1986, ch. 4.
     """
     most = max(len(surface.aspheric) for surface in surfaces)
     numbers = np.array([(*surface[:2], *surface[3:], len(surface.aspheric)) for surface in surfaces], np.float64)

@@ -79,8 +79,10 @@ def read_zmx(path: str | os.PathLike[str]) -> dict[str, Any]:
 def _stop_mm(
     head: dict[str, list[str]], surfaces: list[dict[str, Any]], unit_mm: float, wavelength_nm: float
 ) -> float:
-    """Return the diameter of a stop without a rim: where the paraxial ray parallel to the axis meets it that enters
-    at the edge of the entrance pupil."""
+    """Return the diameter of a stop without a rim, mm.
+
+    A paraxial ray parallel to the axis that enters at the edge of the entrance pupil meets the edge of the stop.
+    """
     height, slope, index, at_stop = 1.0, 0.0, 1.0, 0.0
     for surface in surfaces:
         at_stop = height if surface["stop"] else at_stop
@@ -89,12 +91,13 @@ def _stop_mm(
         curvature = 1 / (surface["radius_mm"] or math.inf) + 2 * (surface["aspheric"] or [0.0])[0]
         slope = (index * slope - height * (after - index) * curvature) / after
         height, index = height + slope * surface["thickness_mm"], after
-    for key, power in ("ENPD", 1.0), ("FNUM", abs(slope)):
+    for key in ("ENPD", "FNUM"):
         if key in head:
-            pupil = _number(key, head[key])
-            if not (0 < pupil < math.inf and power and at_stop):
-                raise ValueError(f"{key} is {pupil:g}: the stop of no DIAM has no diameter from it")
-            return 2 * abs(at_stop) * (pupil * unit_mm / 2 if key == "ENPD" else 1 / power / pupil / 2)
+            given = _number(key, head[key])
+            pupil = given * unit_mm if key == "ENPD" else 1 / (abs(slope) * given) if slope * given else 0.0
+            if not (0 < pupil * abs(at_stop) < math.inf):
+                raise ValueError(f"{key} is {given:g}: the stop of no DIAM has no diameter from it")
+            return pupil * abs(at_stop)
     raise ValueError("the stop has no DIAM, and the file no ENPD or FNUM: one of them is needed")
 
 

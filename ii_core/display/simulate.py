@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.checks import view_size
 from ..camera.camera import IICamera, Pair
-from ..picture.assumed import ASSUMED, shown_pitch_mm
+from ..picture.assumed import shown_pitch_mm
 from ..picture.picture import IIPicture, codes8
 from ..picture.view import camera_of, lens_array_mm, view_positions
 
@@ -63,7 +63,7 @@ def _spots(camera: IICamera, eye: NDArray[np.float64], size: Pair) -> NDArray[np
     right = np.cross([0.0, 1.0, 0.0], ahead)
     right /= np.linalg.norm(right)
     up = np.cross(ahead, right)
-    wide, high = lens_array_mm(camera) if camera.name == ASSUMED else camera.size_mm
+    wide, high = lens_array_mm(camera)
     corners = np.array([[x, y, camera.gap_mm] for x in (-1, 1) for y in (-1, 1)]) * [wide / 2, high / 2, 1] - eye
     tangents = np.abs(np.stack([corners @ right, corners @ up]) / (corners @ ahead))
     scale = max(tangents[0].max() / size[0], tangents[1].max() / size[1]) * 2

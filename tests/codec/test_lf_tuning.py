@@ -606,7 +606,7 @@ def test_the_first_view_is_finer_the_more_views_it_predicts_and_a_view_alone_is_
 def test_the_preset_best_needs_less_of_single_views():
     """In the mean of two: the search is no finer than half a percent."""
     saved = []
-    for grey in (data.camera()[100:228, 100:228], data.astronaut()[:128, 150:278, 1]):
+    for grey in (data.camera()[100:292, 100:292], data.astronaut()[:192, 150:342, 1]):
         picture, curves = IIPicture(np.repeat(grey[..., None], 3, axis=2), grey.shape, (1, 1)), {}
         for scheme in ("si-lf", "si-lf:best"):
             files = [encode(picture, scheme, qp=qp) for qp in (30, 36, 42, 48)]

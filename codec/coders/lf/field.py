@@ -121,6 +121,7 @@ class Field:
             loop_filter.code_filter(coder, self.filters, job.at, same, self._own_taps())
         if self.header.exact:
             exact = self._exact
+            # An encoder's is a transposed array: kernels would be compiled again for it.
             rotation, sixteen = np.ascontiguousarray(self.header.colours), exact.pixels.itemsize == 2
             exact.pixels[:] = self.pixels[job.at]
             prepare(exact, self.views, job.at, rotation, sixteen)
