@@ -347,12 +347,13 @@ class Viewer {
   // Labels of the values.
   shown() {
     const { state, meta: { camera: c } } = this, degrees = (angle) => `${(angle * 180 / Math.PI).toFixed(1)}°`;
+    const long = (mm, digits) => Math.abs(mm) < 1e4 ? `${mm.toFixed(digits)} mm` : `${(mm / 1000).toPrecision(4)} m`;
     const late = !this.take.playing && this.take.shown !== state.t;
     return {
       t: late ? "loading" : `${(state.t / this.meta.fps).toFixed(2)} s`,
       x: degrees(state.x * c.phi), y: degrees(state.y * c.theta),
-      r: c.assumed ? `${state.r.toFixed(2)} ×` : `${(state.r * c.distance_mm).toFixed(0)} mm`,
-      f: c.assumed ? `${state.f.toFixed(2)} lens/px` : `z ${this.depthOf(state.f).toFixed(1)} mm`,
+      r: c.assumed ? `${state.r.toFixed(2)} ×` : long(state.r * c.distance_mm, 0),
+      f: c.assumed ? `${state.f.toFixed(2)} lens/px` : `z ${long(this.depthOf(state.f), 1)}`,
       a: `${(2 * state.a - 1).toFixed(1)} px`, zoom: `${state.zoom.toFixed(2)} ×`, eyes: degrees(2 * state.eyes * c.phi),
       split: `${(100 * state.split).toFixed(0)} %`, gain: `${state.gain.toFixed(1)} ×`,
     };
