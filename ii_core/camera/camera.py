@@ -110,6 +110,9 @@ class IICamera:
     both_sides : bool
         The array sees the image of a main lens that is not in ``optics``, on both sides of the lens plane; z is that
         of the image. Rays do not depend on it.
+    packed : bool
+        Elementary images of M/K × N/L pixels lie side by side in the picture. Before the lenses each stands in the
+        middle of its place, whose pitch may be another: with 9×1 pixels under square lenses, for a row of cameras.
     name : str
         Name in files and messages.
 
@@ -138,13 +141,14 @@ class IICamera:
     start_mm: float = 0.0
     viewer_mm: float | None = None
     both_sides: bool = False
+    packed: bool = False
     name: str = ""
 
     def __post_init__(self) -> None:
         def put(field: str, value: Any) -> None:
             object.__setattr__(self, field, value)
 
-        check_fields(self, optics=sequence, both_sides=flag, name=text)
+        check_fields(self, optics=sequence, both_sides=flag, packed=flag, name=text)
         for field in ("pixels", "lenses"):
             across, down = whole_pair(field, getattr(self, field))
             if max(across, down) > MOST_ALONG or across * down > MOST_PIXELS:
@@ -177,6 +181,8 @@ class IICamera:
                 raise ValueError(f"{field} is {getattr(self, field):g}: at most {most:g} either way is needed")
         if self.lens_drift_mm is not None:
             put("lens_drift_mm", _drift(self.lens_drift_mm, self.size_mm))
+        if self.packed:
+            self._check_packed()
         if hasattr(model, "thickness"):
             model.thickness(self.lens_pitch_mm)  # raises ValueError if the sphere is too small for its cell
         behind = self.gap_mm
@@ -187,6 +193,14 @@ class IICamera:
                     "elements are needed in order, away from the pixels"
                 )
             behind = element.end_mm
+
+    def _check_packed(self) -> None:
+        if any(m % k for m, k in zip(self.pixels, self.lenses, strict=True)):
+            (m, n), (k, l) = self.pixels, self.lenses
+            raise ValueError(f"packed pixels are {m}×{n} under {k}×{l} lenses: whole elementary images are needed")
+        for field in ("lattice", "lens_offset_mm", "lens_turn_deg", "lens_shear", "lens_drift_mm"):
+            if getattr(self, field) != getattr(IICamera, field):
+                raise ValueError(f"packed pixels have {field} {getattr(self, field)}: a straight array is needed")
 
     def _check_start(self) -> None:
         start = within("start_mm", self.start_mm, 0, MOST_MM, "distance", " mm")
@@ -203,7 +217,10 @@ class IICamera:
 
     @property
     def ei_pitch_mm(self) -> tuple[float, float]:
-        """Pitch of the elementary images on the pixel array, across and down."""
+        """Pitch of the elementary images on the pixel array, across and down; of packed ones their size."""
+        if self.packed:
+            u, v = self.ei_pixels
+            return u * self.pixel_pitch_mm, v * self.pixel_pitch_mm
         across, down = self.lens_pitch_mm
         return across * self._ei_per_lens, down * self._ei_per_lens
 
@@ -227,8 +244,11 @@ class IICamera:
     def lens_lattice(self) -> Lattice:
         """The centres of elementary images, in pixels from the top left corner of the pixel array.
 
-        They lie under the lens centres, but for cameras with a `viewer_mm`.
+        They lie under the lens centres, but for cameras with a `viewer_mm` and packed ones.
         """
+        if self.packed:
+            u, v = (m // k for m, k in zip(self.pixels, self.lenses, strict=True))
+            return Lattice(self.lenses, (float(u), float(v)), (0.0, 0.0), False, None, None)
         pitch = []
         for pixels, lenses, lens_pitch in zip(self.pixels, self.lenses, self.ei_pitch_mm, strict=True):
             even, given = pixels / lenses, lens_pitch / self.pixel_pitch_mm
@@ -278,6 +298,11 @@ class IICamera:
         return self.lens_model.erect
 
     @property
+    def vertical_parallax(self) -> bool:
+        """Whether views differ down: not under lenticular lenses, nor those of one row of cameras."""
+        return self.lens_model.vertical_parallax and not (self.packed and self.ei_pixels[1] == 1)
+
+    @property
     def samples_aperture(self) -> bool:
         """Whether rays of a pixel spread over an aperture."""
         return self.lens_model.samples_aperture
@@ -294,7 +319,9 @@ class IICamera:
 
     @property
     def size_mm(self) -> tuple[float, float]:
-        """Width and height of the pixel array."""
+        """Width and height of the pixel array; if it is packed, of the lens array."""
+        if self.packed:
+            return self.lenses[0] * self.lens_pitch_mm[0], self.lenses[1] * self.lens_pitch_mm[1]
         return self.pixels[0] * self.pixel_pitch_mm, self.pixels[1] * self.pixel_pitch_mm
 
     @property
@@ -402,21 +429,14 @@ class IICamera:
         return np.arange(self.pixels[0])[None, cols], np.arange(self.pixels[1])[rows, None]
 
     def _bundle(self, m: NDArray[Any], n: NDArray[Any], sample: Floats, place: Floats) -> Bundle:
-        lattice, pitch, (width, height) = self.lens_lattice, self.pixel_pitch_mm, self.size_mm
+        lattice = self.lens_lattice
         k, l = lattice.nearest(m, n)
-        x, y = lattice.centres(k, l)
-        cx, cy = x * pitch - width / 2, height / 2 - y * pitch
-        if self.viewer_mm is not None:  # lenses stand closer, or wider, than their elementary images
-            (sx, sy), ratio = self.lens_offset_mm, self._ei_per_lens
-            cx, cy = sx + (cx - sx) / ratio, sy + (cy - sy) / ratio
+        places = self._packed_places if self.packed else self._places
+        px, py, cx, cy = places(m + sample[..., 0], n + sample[..., 1], k, l)
         ax, ay = unit_disk(place) if self.lens_model.samples_aperture else (np.float64(0), np.float64(0))
         under = Under(
-            px=(m + sample[..., 0]) * pitch - width / 2,
-            py=height / 2 - (n + sample[..., 1]) * pitch,
-            cx=cx,
-            cy=cy,
-            k=k, l=l, ax=ax, ay=ay, gap=self.gap_mm, cell=self.lens_pitch_mm, hexagonal=lattice.hexagonal,
-            axes=lattice.axes,
+            px=px, py=py, cx=cx, cy=cy, k=k, l=l, ax=ax, ay=ay, gap=self.gap_mm, cell=self.lens_pitch_mm,
+            hexagonal=lattice.hexagonal, axes=lattice.axes,
         )  # fmt: skip
         rays = self.lens_model.leave(under)
         if self.start_mm:
@@ -424,6 +444,23 @@ class IICamera:
         for front in self.front:
             rays = front.pass_on(rays)
         return rays
+
+    def _places(self, m: Any, n: Any, k: Any, l: Any) -> tuple[Any, Any, Any, Any]:
+        """Return x and y of places on the pixel array, and of the centres of lenses."""
+        pitch, (width, height) = self.pixel_pitch_mm, self.size_mm
+        x, y = self.lens_lattice.centres(k, l)
+        cx, cy = x * pitch - width / 2, height / 2 - y * pitch
+        if self.viewer_mm is not None:  # lenses stand closer, or wider, than their elementary images
+            (sx, sy), ratio = self.lens_offset_mm, self._ei_per_lens
+            cx, cy = sx + (cx - sx) / ratio, sy + (cy - sy) / ratio
+        return m * pitch - width / 2, height / 2 - n * pitch, cx, cy
+
+    def _packed_places(self, m: Any, n: Any, k: Any, l: Any) -> tuple[Any, Any, Any, Any]:
+        """Return what `_places` does if elementary images stand apart."""
+        pitch, ratio = self.pixel_pitch_mm, self._ei_per_lens
+        (across, down), (u, v) = self.lens_pitch_mm, self.ei_pixels
+        cx, cy = (k - (self.lenses[0] - 1) / 2) * across, ((self.lenses[1] - 1) / 2 - l) * down
+        return cx * ratio + (m - (k + 0.5) * u) * pitch, cy * ratio - (n - (l + 0.5) * v) * pitch, cx, cy
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values for `from_json`; values equal to their default are left out."""
@@ -436,7 +473,7 @@ class IICamera:
             "gap_mm": self.gap_mm,
         }
         optional = ("lens_pitch_mm", "lattice", "lens_offset_mm", "lens_turn_deg", "lens_shear", "origin_mm")
-        for field in (*optional, "start_mm", "viewer_mm", "both_sides"):
+        for field in (*optional, "start_mm", "viewer_mm", "both_sides", "packed"):
             value = getattr(self, field)
             if value != (self._shared_pitch_mm if field == "lens_pitch_mm" else getattr(IICamera, field)):
                 data[field] = list(value) if isinstance(value, tuple) else value
@@ -470,6 +507,7 @@ class IICamera:
             "start_mm",
             "viewer_mm",
             "both_sides",
+            "packed",
             "about",
             "notes",
         }

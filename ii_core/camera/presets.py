@@ -154,7 +154,7 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         lenses=(camera.lenses[0] // scale, camera.lenses[1] // scale),
         pixel_pitch_mm=pitch,
         gap_mm=camera.gap_mm * scale,
-        lens_pitch_mm=_times(camera.lens_pitch_mm, scale) if viewer is None else None,  # type: ignore[arg-type]
+        lens_pitch_mm=_times(camera.lens_pitch_mm, scale) if viewer is None or camera.packed else None,  # type: ignore[arg-type]
         start_mm=start,
         viewer_mm=viewer,
         lens_offset_mm=_times(camera.lens_offset_mm, scale),

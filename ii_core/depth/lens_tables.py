@@ -93,8 +93,9 @@ def pixel_tables(
         x, y = np.floor(x + 0.5), np.floor(y + 0.5)
     sign = -1.0 if erect else 1.0
     # Without vertical parallax one row of pixels, under whatever lens, sees one row of the scene.
-    vertical = sign * per_lens if camera.lens_model.vertical_parallax else np.full_like(per_lens, -1.0)
-    return _table(x, u, sign * per_lens * u, across, nearest), _table(y, v, vertical * v, down, nearest)
+    wide, high = (pitch / camera.pixel_pitch_mm for pitch in camera.lens_pitch_mm) if camera.packed else (u, v)
+    vertical = sign * per_lens * high if camera.vertical_parallax else np.full_like(per_lens, -v)
+    return _table(x, u, sign * per_lens * wide, across, nearest), _table(y, v, vertical, down, nearest)
 
 
 def pixels_per_lens(camera: IICamera, layers_mm: Floats) -> Floats:

@@ -207,7 +207,7 @@ def _limit_lines(camera: IICamera, p: dict[str, Any]) -> list[str]:
             f"a pixel has {pixel * 1e3:.3g} µm: "
             + ("diffraction limits, finer pixels gain nothing." if diffraction["limits"] else "the pixel limits.")
         )
-    if not camera.lens_model.vertical_parallax:
+    if not camera.vertical_parallax:
         lines.append("No parallax down: rows are sharp to the pixel, and all views have one height.")
     if not camera.regular:
         lines.append(

@@ -121,7 +121,7 @@ def properties(camera: IICamera, *, wavelength_mm: float = WAVELENGTH_MM) -> dic
         ``viewing_zone``, ``cells`` and ``map_bytes``, see the functions of these names.
     """
     (pitch_x, pitch_y), gap, pixel = camera.lens_pitch_mm, camera.gap_mm, camera.pixel_pitch_mm
-    vertical = camera.lens_model.vertical_parallax
+    vertical = camera.vertical_parallax
     down = view_angle_deg(lens_pitch_mm=pitch_y, gap_mm=gap) if vertical else 0.0
     u, v = camera.ei_pixels
     planes = image_planes(camera)
@@ -218,7 +218,7 @@ def viewing_zone(camera: IICamera) -> dict[str, Any]:
         `five_viewpoints` uses: where viewing zones meet, else three times the least distance. Widths down are
         infinite without vertical parallax.
     """
-    vertical, tangents, spans = camera.lens_model.vertical_parallax, [], []
+    vertical, tangents, spans = camera.vertical_parallax, [], []
     for axis in range(2):
         lattice, count = camera.lens_lattice, camera.lenses[axis]
         shift = 0.5 if lattice.hexagonal and axis == 0 and camera.lenses[1] > 1 else 0.0

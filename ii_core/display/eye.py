@@ -192,7 +192,7 @@ def _refraction(display: DisplayModel, distance: float, sign: float) -> Refracti
         radius = lens.aperture_mm / 2 if lens.aperture_mm else math.inf
     return Refraction(
         to_pixels=sign * gap / (distance * pitch), spread=spread / pitch, slope=1 / distance, bend=bend,
-        radius=float(radius), vertical=float(lens.vertical_parallax),
+        radius=float(radius), vertical=float(display.camera.vertical_parallax),
     )  # fmt: skip
 
 

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.checks import view_size
 from ..base.jit import kernel
 from ..camera.camera import IICamera, Pair
-from ..picture.assumed import parallax_down, shown_pitch_mm
 from ..picture.picture import IIPicture, codes8
 from ..picture.view import camera_of, five_viewpoints, view_positions, widening
 
@@ -89,8 +88,8 @@ def _shifts(camera: IICamera, erect: bool, depth_mm: float | None) -> NDArray[np
         raise ValueError(f"depth is {depth_mm} mm: a finite number is needed")
     per_mm = (-1 if erect else 1) * camera.pixel_pitch_mm / camera.gap_mm
     beyond = depth_mm - camera.origin_mm[2] - camera.gap_mm
-    shift = per_mm * beyond / widening(camera, beyond) / np.array(shown_pitch_mm(camera))
-    return shift * [1, parallax_down(camera)]
+    shift = per_mm * beyond / widening(camera, beyond) / np.array(camera.lens_pitch_mm)
+    return shift * [1, camera.vertical_parallax]
 
 
 @kernel

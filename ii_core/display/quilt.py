@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ..base.checks import Pair, number, view_size, whole_pair
 from ..formats.quilt import quilt_pixels
-from ..picture.assumed import shown_pitch_mm
 from ..picture.picture import IIPicture
 from ..picture.view import camera_of
 from .look import display_views, zone_half_deg
@@ -60,7 +59,7 @@ def shown_shares(picture: IIPicture, aspect: float, *, whole: bool = False) -> t
     """
     if not (math.isfinite(number("aspect", aspect)) and aspect > 0):
         raise ValueError(f"aspect is {aspect}: a positive number, width over height, is needed")
-    (k, l), pitch = picture.lenses, shown_pitch_mm(camera_of(picture))
+    (k, l), pitch = picture.lenses, camera_of(picture).lens_pitch_mm
     narrower = aspect * l * pitch[1] / (k * pitch[0])  # the display's aspect over that of the array
     return (1.0, 1 / narrower) if (narrower > 1) != whole else (narrower, 1.0)
 

@@ -7,7 +7,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.checks import view_size
 from ..camera.camera import IICamera, Pair
-from ..picture.assumed import shown_pitch_mm
 from ..picture.picture import IIPicture, codes8
 from ..picture.view import camera_of, lens_array_mm, view_positions
 
@@ -41,7 +40,7 @@ def display_simulation(
         raise ValueError(f"fill is {fill}: a share from 0 to 1 is needed")
     x, y = view_positions(camera, viewpoint_mm, erect=picture.erect)
     spot = _spots(camera, np.asarray(viewpoint_mm, np.float64) - camera.origin_mm, (width, height))
-    (k, l), pitch = picture.lenses, shown_pitch_mm(camera)
+    (k, l), pitch = picture.lenses, camera.lens_pitch_mm
     wide, high = lens_array_mm(camera)
     across = (spot[..., 0] + wide / 2) / pitch[0]
     down = (high / 2 - spot[..., 1]) / pitch[1]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -80,10 +79,7 @@ def picture_of(
         pixels[row::rows, col::cols] = views.read(a, b)
     camera = None
     if views.structure is None and views.rig is not None:
-        if cols == rows:
-            camera = views.rig.camera((cols, rows), (width, height))
-        else:
-            warnings.warn(f"{cols}×{rows} views get no camera: as many down as across are needed", stacklevel=2)
+        camera = views.rig.camera((cols, rows), (width, height))
     picture = IIPicture(pixels, (width, height), (cols, rows), camera)
     if views.structure is None:
         return picture, order

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from ..base import checks
 from ..base.files import write_image
 from ..camera.camera import Pair
-from ..picture.assumed import shown_pitch_mm
 from ..picture.picture import IIPicture
 from .grid import WHOLE_ORDER, Views, camera_views, read_view
 
@@ -124,7 +123,7 @@ def quilt_path(path: str | os.PathLike[str], picture: IIPicture) -> Path:
     """Return the path that `write_quilt` writes, with tiles and aspect after the stem."""
     picture.check_regular()
     (k, l), (u, _) = picture.lenses, picture.ei_pixels
-    pitch = shown_pitch_mm(picture.camera) if picture.camera else (1.0, 1.0)
+    pitch = picture.camera.lens_pitch_mm if picture.camera else (1.0, 1.0)
     return quilt_name(path, _tiles(u, (k, l)), k * pitch[0] / (l * pitch[1]))
 
 

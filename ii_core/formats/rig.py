@@ -4,7 +4,8 @@ U×V cameras stand B apart in a plane and look the same way. Each has its pictur
 of the plane at distance Z₀, the plane of zero disparity. That plane is the lens plane of an II-camera. Its lenses are
 the pixels of the views, δL = Z₀·s/f apart (s pixel pitch, f focal length of a camera). The viewing zones of all meet
 in the plane of the cameras, Z₀ before it. Rays start there (``start_mm``), and the scene stands on both sides. Pixel
-pitch and gap follow from Λ = δP·Z₀/B and the pitch U·δP = δL·(1 − Λ/Z₀) of elementary images.
+pitch and gap follow from Λ = δP·Z₀/B and the pitch U·δP = δL·(1 − Λ/Z₀) of elementary images. In a row, or if U ≠ V,
+the larger of both fills the pitch, and elementary images are packed.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ class Rig:
         Parameters
         ----------
         views : (U, V)
-            Cameras across and down; as many, since pixels are square.
+            Cameras across and down.
         size : (K, L)
             Pixels of a view.
 
@@ -62,21 +63,14 @@ class Rig:
         -------
         IICamera
             The cameras stand in the plane z = 0, the middle one on the axis: z is the distance from them.
-
-        Raises
-        ------
-        ValueError
-            If there are not as many views down as across.
         """
         (u, v), (k, l) = whole_pair("views", views), whole_pair("size", size)
-        if u != v:
-            raise ValueError(f"views are {u}×{v}: a camera of square pixels needs as many down as across")
         pixel = self.sensor_mm / max(k, l)
         focus = self.focus_mm
         if focus is None:
             focus = self.baseline_mm * self.focal_mm / pixel / FAR_DISPARITY
         lens = focus * pixel / self.focal_mm
-        pitch = lens / (u + lens / self.baseline_mm)
+        pitch = lens / (max(u, v) + lens / self.baseline_mm)
         gap = pitch * focus / self.baseline_mm
         return IICamera(
             name=name,
@@ -88,6 +82,7 @@ class Rig:
             viewer_mm=focus,
             start_mm=focus,
             origin_mm=(0.0, 0.0, focus - gap),
+            packed=u != v,
         )
 
 

@@ -33,20 +33,9 @@ def with_assumed_camera(picture: IIPicture, angle_deg: float = ASSUMED_ANGLE_DEG
         return picture
     if not 0 < angle_deg < 180:
         raise ValueError(f"angle is {angle_deg:g}°: an angle between 0 and 180° is needed")
-    gap = picture.ei_pixels[0] / 2 / math.tan(math.radians(angle_deg / 2))
-    camera = IICamera(pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=1.0, gap_mm=gap, name=ASSUMED)
+    (u, v), tangent = picture.ei_pixels, math.tan(math.radians(angle_deg / 2))
+    camera = IICamera(
+        name=ASSUMED, pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=1.0, gap_mm=u / 2 / tangent,
+        lens_pitch_mm=(u, u), packed=u != v,
+    )  # fmt: skip
     return replace(picture, camera=camera)
-
-
-def shown_pitch_mm(camera: IICamera) -> tuple[float, float]:
-    """Return the lens pitch at which a picture is shown: that of an assumed camera is the same across and down.
-
-    Pixels of foreign views are square, and views of a row of cameras have one pixel under each lens down.
-    """
-    across, down = camera.lens_pitch_mm
-    return across, across if camera.name == ASSUMED else down
-
-
-def parallax_down(camera: IICamera) -> bool:
-    """Return whether views differ down: not under lenticular lenses, nor in one row of assumed cameras."""
-    return camera.lens_model.vertical_parallax and not (camera.name == ASSUMED and camera.ei_pixels[1] == 1)

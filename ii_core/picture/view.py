@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import checks
 from ..camera.camera import IICamera
-from .assumed import ASSUMED, parallax_down, shown_pitch_mm
 from .component import picture_pixels, sub_images
 from .picture import IIPicture
 
@@ -93,7 +92,7 @@ def view_positions(
     e = e - camera.origin_mm
     (k, l), (u, v) = camera.lenses, camera.ei_pixels
     sign = -1.0 if erect else 1.0
-    (width, height), (pitch_x, pitch_y), down = lens_array_mm(camera), shown_pitch_mm(camera), parallax_down(camera)
+    (width, height), (pitch_x, pitch_y), down = lens_array_mm(camera), camera.lens_pitch_mm, camera.vertical_parallax
     lens_x = (np.arange(k) + 0.5) * pitch_x - width / 2
     lens_y = height / 2 - (np.arange(l) + 0.5) * pitch_y
     to_pixels = sign * camera.gap_mm / ((camera.gap_mm - e[2]) * camera.pixel_pitch_mm)
@@ -107,9 +106,9 @@ def view_positions(
 
 def lens_array_mm(camera: IICamera) -> tuple[float, float]:
     """Width and height of the lens array of a regular structure."""
-    if camera.viewer_mm is None and camera.name != ASSUMED:
+    if camera.viewer_mm is None:
         return camera.size_mm
-    across, down = shown_pitch_mm(camera)
+    across, down = camera.lens_pitch_mm
     return camera.lenses[0] * across, camera.lenses[1] * down
 
 
@@ -127,7 +126,7 @@ def five_viewpoints(camera: IICamera) -> dict[str, NDArray[np.float64]]:
     (width, height), (pitch_x, pitch_y) = lens_array_mm(camera), camera.ei_pitch_mm
     gap, meeting = camera.gap_mm, 0.0 if camera.viewer_mm is None else 1 / camera.viewer_mm
     tan_x, tan_y = pitch_x / 2 / gap, pitch_y / 2 / gap
-    r = camera.viewer_mm or 3 * max(width / 2 / tan_x, height / 2 / tan_y * parallax_down(camera))
+    r = camera.viewer_mm or 3 * max(width / 2 / tan_x, height / 2 / tan_y * camera.vertical_parallax)
     # A lens at the far edge, W/2, sees its own EI while (W/2 + r·sin φ) / (r·cos φ) ≤ tan + W/2d.
     inside_x = tan_x - 0.5 * camera.pixel_pitch_mm / gap + width / 2 * meeting
     inside_y = tan_y - 0.5 * camera.pixel_pitch_mm / gap + height / 2 * meeting
@@ -222,7 +221,7 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
     beyond = depth_mm - camera.origin_mm[2] - camera.gap_mm
     per_step = sign * camera.pixel_pitch_mm * beyond / camera.gap_mm / widening(camera, beyond)
     total, weight = np.zeros((rows, cols, 3)), np.zeros((rows, cols, 1))
-    pitch_x, pitch_y = shown_pitch_mm(camera)
+    pitch_x, pitch_y = camera.lens_pitch_mm
     for v in range(v_count):
         i0, i1, di, in_y = _shifted(rows, (v - (v_count - 1) / 2) * per_step / pitch_y)
         for u in range(u_count):

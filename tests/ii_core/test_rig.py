@@ -6,10 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ii_core import (
+    IICamera,
     IIPicture,
     Rig,
     depth_of_disparity,
     disparity_of_depth,
+    estimate_depth,
     find_views,
     five_viewpoints,
     picture_of,
@@ -41,20 +43,25 @@ def waves(x, y):
     return np.sin(x / 60) * np.cos(y / 50 + 0.3)
 
 
-@given(baseline=LENGTHS, focal=LENGTHS, sensor=LENGTHS, focus=st.floats(200, 10000), views=st.integers(2, 9))
+@given(
+    baseline=LENGTHS, focal=LENGTHS, sensor=LENGTHS, focus=st.floats(200, 10000),
+    views=st.tuples(st.integers(1, 9), st.integers(1, 9)),
+)  # fmt: skip
 def test_every_view_is_that_of_a_pinhole_camera(baseline, focal, sensor, focus, views):
     """Camera u stands at (u − (U−1)/2)·B; pixel k of all cameras sees the same place of the zero-disparity plane."""
     rig = Rig(baseline_mm=baseline, focal_mm=focal, sensor_mm=sensor, focus_mm=focus)
-    camera = rig.camera((views, views), (8, 6))
+    camera, (u, v) = rig.camera(views, (8, 6)), views
     L, D = camera.rays()
     np.testing.assert_allclose(L[..., 2], 0, atol=1e-6)
-    place = (np.arange(views) - (views - 1) / 2) * baseline
-    np.testing.assert_allclose(L[0, :, 0].reshape(8, views), np.tile(place, (8, 1)), atol=1e-6 * baseline)
-    np.testing.assert_allclose(L[:, 0, 1].reshape(6, views), np.tile(-place, (6, 1)), atol=1e-6 * baseline)
-    on_plane = (L + focus / D[..., 2:] * D)[0, :, 0].reshape(8, views)
-    expected = (np.arange(8) - 3.5) * focus * sensor / 8 / focal
-    np.testing.assert_allclose(on_plane, np.repeat(expected[:, None], views, axis=1), atol=1e-6 * focus)
-    assert camera.regular and camera.ei_pixels == (views, views)
+    across, down = ((np.arange(n) - (n - 1) / 2) * baseline for n in views)
+    np.testing.assert_allclose(L[0, :, 0].reshape(8, u), np.tile(across, (8, 1)), atol=1e-6 * baseline)
+    np.testing.assert_allclose(L[:, 0, 1].reshape(6, v), np.tile(-down, (6, 1)), atol=1e-6 * baseline)
+    on_plane, pixel = L + focus / D[..., 2:] * D, focus * sensor / 8 / focal
+    columns, rows = (np.arange(8) - 3.5) * pixel, (2.5 - np.arange(6)) * pixel
+    np.testing.assert_allclose(on_plane[0, :, 0], np.repeat(columns, u), atol=1e-6 * focus)
+    np.testing.assert_allclose(on_plane[:, 0, 1], np.repeat(rows, v), atol=1e-6 * focus)
+    assert camera.regular and camera.ei_pixels == views and camera.packed == (u != v)
+    assert IICamera.from_json(camera.to_json()) == camera
 
 
 @given(z=st.floats(300, 5000))
@@ -64,6 +71,22 @@ def test_disparity_has_both_signs_and_the_closed_form(z):
     assert disparity_of_depth(CAMERA, z) == pytest.approx(expected, rel=1e-9, abs=1e-9)
     assert depth_of_disparity(CAMERA, expected) == pytest.approx(z)
     assert (expected > 0) == (z < 900) or abs(z - 900) < 1e-6
+
+
+@pytest.mark.parametrize("views", [(9, 1), (1, 7), (3, 5)], ids=str)
+@pytest.mark.parametrize("z", [600.0, 1600.0])
+def test_rows_and_other_grids_have_depth_in_millimetres(views, z):
+    """A wall whose pattern no shift repeats: its depth, the same wall refocused, and the middle view of each camera."""
+    picture = seen(RIG.camera(views, (64, 48)), lambda x, y: waves(x, y) * np.cos(x * y / 9000), z)
+    stack, camera = sub_images(picture), picture.camera
+    found = estimate_depth(picture)
+    assert np.median(found.depth_mm) == pytest.approx(z, rel=0.02)
+    front, valid = view_image(picture, five_viewpoints(camera)["front"], interpolation="nearest")
+    np.testing.assert_array_equal(front, stack[views[1] // 2, views[0] // 2])
+    sharp = refocus(picture, z)
+    inner = (slice(10, -10), slice(10, -10), 0)
+    assert valid.all() and np.abs(sharp[inner] - front[inner].astype(float)).max() < 4
+    assert camera.vertical_parallax == (views[1] > 1)
 
 
 @pytest.mark.parametrize("z", [600.0, 900.0, 1600.0])
@@ -140,7 +163,10 @@ def test_parameters_of_the_benchmark_are_read(tmp_path):
 def test_invalid_lengths_and_grids_are_refused():
     with pytest.raises(ValueError, match="focal_mm is 0"):
         Rig(baseline_mm=1, focal_mm=0, sensor_mm=1)
-    with pytest.raises(ValueError, match="5×3"):
-        RIG.camera((5, 3), (64, 48))
+    measures = {"pixel_pitch_mm": 1.0, "gap_mm": 2.0, "packed": True}
+    with pytest.raises(ValueError, match="packed pixels are 9×4 under 2×2 lenses: whole elementary images"):
+        IICamera(pixels=(9, 4), lenses=(2, 2), **measures)
+    with pytest.raises(ValueError, match="packed pixels have lattice hexagonal"):
+        IICamera(pixels=(8, 4), lenses=(2, 2), lattice="hexagonal", **measures)
     with pytest.raises(ValueError, match="no depth before the camera"):
         disparity_layers(CAMERA, -100, 1)

@@ -25,7 +25,7 @@ from PIL import Image
 
 from ...base.files import atomic_path
 from ...camera.camera import IICamera
-from ...picture.assumed import ASSUMED, parallax_down, shown_pitch_mm, with_assumed_camera
+from ...picture.assumed import ASSUMED, with_assumed_camera
 from ...picture.picture import IIPicture, codes8
 from ...picture.view import camera_of, five_viewpoints, lens_array_mm, view_image
 from ...video.video import IIVideo, video_of
@@ -251,10 +251,10 @@ class _Page:
                 "origin_mm": camera.origin_mm[2],
                 "gap_mm": camera.gap_mm,
                 "pixel_pitch_mm": camera.pixel_pitch_mm,
-                "lens_pitch_mm": list(shown_pitch_mm(camera)),
+                "lens_pitch_mm": list(camera.lens_pitch_mm),
                 "size_mm": list(lens_array_mm(camera)),
                 "viewer_mm": camera.viewer_mm,
-                "vertical_parallax": parallax_down(camera),
+                "vertical_parallax": camera.vertical_parallax,
                 "distance_mm": plane - front[2],
                 "phi": math.atan2(camera.origin_mm[0] - left[0], plane - left[2]),
                 "theta": math.atan2(up[1] - camera.origin_mm[1], plane - up[2]),
