@@ -36,7 +36,8 @@ def preset(name: str | os.PathLike[str], *, scale: int = 1) -> IICamera:
     Parameters
     ----------
     name : str or path
-        One of `camera_names`; ``setup2`` is ``setup2-16``. Or a file that ends in ``.json``.
+        One of `camera_names`; ``setup2`` is ``setup2-16``. Or a file that ends in ``.json``, or an II-picture, whose
+        own camera it is.
     scale : int
         Divides the number of lenses (of pixels for a camera of one lens) along both axes. Sensor size, pixels per
         elementary image, viewing angle and scene planes in focus do not change. Pixel pitch, lens pitch, gap and
@@ -63,12 +64,18 @@ def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IIC
     Parameters and errors are those of `preset`.
     """
     path, stem = Path(name), ALIASES.get(str(name), str(name))
+    if path.suffix not in ("", ".json") and path.is_file():
+        path = path.with_name(f"{path.name}.json")
     if path.suffix == ".json":
         data, stem, folder = _read(path), path.stem, path.parent
+        if data.get("format") == "ii-picture" and (data := data.get("camera")) is None:
+            raise ValueError(f"{path}: the picture has no camera: `camera --set` gives it one")
     else:
         if stem not in (known := _read(PACKAGE)):
             names = ", ".join([*known, *ALIASES])
-            raise ValueError(f"unknown camera {checks.shown(str(name))}: known are {names}, or give a .json file")
+            raise ValueError(
+                f"unknown camera {checks.shown(str(name))}: known are {names}, or give a .json file or an II-picture"
+            )
         data, folder = known[stem], PACKAGE.parent
     try:
         members = data["cameras"] if data.get("kind") == "set" else [data]

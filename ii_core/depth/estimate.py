@@ -152,7 +152,7 @@ def estimate_depth(
     if not (0 <= at[0] < u and 0 <= at[1] < v):
         raise ValueError(f"view is {at[0]},{at[1]}: columns 0–{u - 1} and rows 0–{v - 1} are there")
     if low is not None and high is not None and not low < high:
-        raise ValueError(f"low is {low:g}, high {high:g}: low < high is needed")
+        raise ValueError(f"range of disparities is {low:g} to {high:g} px: low < high is needed")
     told = progress if progress is not None else lambda done, total, step: None
     total = 4 + STEPS
     told(0, total, "views")

@@ -69,12 +69,13 @@ class Arrangement:
         row, col = (b, a) if self.transposed else (a, b)
         return rows - 1 - row if self.flip_down else row, cols - 1 - col if self.flip_across else col
 
-    def describe(self) -> str:
-        """Return the arrangement, its basis and the disparity in one line."""
+    def describe(self, grid: tuple[int, int] = (2, 2)) -> str:
+        """Return the arrangement of a grid of (columns, rows), its basis and the disparity in one line."""
         across = "right to left" if self.flip_across else "left to right"
         down = "bottom to top" if self.flip_down else "top to bottom"
         first, second = (across, down) if self.transposed else (down, across)
-        line = f"numbers run {first}, then {second} ({self.basis})"
+        order = down if grid[0] == 1 else across if grid[1] == 1 else f"{first}, then {second}"
+        line = f"numbers run {order} ({self.basis})"
         if self.disparity is None:
             return line
         low, high = self.disparity

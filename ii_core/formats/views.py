@@ -59,7 +59,7 @@ def _numbered(folder: Path, members: list[Path], grid: Pair | None) -> Views:
     if not pairs:
         raise ValueError(
             f"the {len(members)} names in {folder} like {members[0].name} do not hold a row and a column number: "
-            "give the grid"
+            "give the grid, as in 9x1"
         )
     size, a, b = min(pairs, key=lambda pair: pair[0])
     table = dict(zip(zip(a, b, strict=True), members, strict=True))

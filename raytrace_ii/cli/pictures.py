@@ -95,7 +95,9 @@ def import_(
     flip_across: Annotated[
         bool | None, typer.Option("--flip-across/--no-flip-across", help="Views are numbered from right to left.")
     ] = None,
-    camera: Annotated[str | None, typer.Option(help="Camera of the II-picture: a .json file or a name.")] = None,
+    camera: Annotated[
+        str | None, typer.Option(help="Camera of the II-picture: a name, a .json file, or another II-picture.")
+    ] = None,
     baseline_mm: Annotated[float | None, typer.Option(help="Distance of neighbouring cameras of an array.")] = None,
     focal_mm: Annotated[float | None, typer.Option(help="Focal length of each camera.")] = None,
     sensor_mm: Annotated[float | None, typer.Option(help="Longer side of each sensor.")] = None,
@@ -164,7 +166,7 @@ def import_(
     (k, l), (u, v) = made.lenses, made.ei_pixels
     say_done(f"{output}: {k}×{l} lenses of {u}×{v} px, {made.pixels.dtype}")
     if order is not None:
-        say(order.describe())
+        say(order.describe((u, v)))
     if nominal:
         say(
             f"no camera is known: a nominal one of {ASSUMED_ANGLE_DEG:g}°, with pixels of 1 mm, is written; "

@@ -199,7 +199,9 @@ def render(
     set_name: Annotated[
         str, typer.Option("--set", help="Render a set instead: reference, benchmark or benchmark:PROFILE.")
     ] = "",
-    camera: Annotated[str, typer.Option(help="A camera's name, a .json file, or a folder of maps.")] = "setup1",
+    camera: Annotated[
+        str, typer.Option(help="A camera's name, a .json file, an II-picture, or a folder of maps.")
+    ] = "setup1",
     scale: Annotated[int, typer.Option(help="Divides the number of lenses, at the same pixels per lens.")] = 1,
     photograph: Photograph,
     motion: Motion,

@@ -21,7 +21,7 @@ GREYS = (0, 128, 255)  # of the mask: outside, filled, seen
 def retarget(
     field: Annotated[Path, typer.Argument(help="An II-picture of regular structure, or a coded file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The II-picture of the other camera.")],
-    camera: Annotated[str, typer.Option(help="The other camera: a name or a .json file.")],
+    camera: Annotated[str, typer.Option(help="The other camera: a name, a .json file, or an II-picture.")],
     scale: Annotated[int, typer.Option(help="Divide the numbers of its lenses by this.")] = 1,
     depth: Annotated[
         Path | None,

@@ -31,7 +31,7 @@ def cameras() -> None:
 @app.command()
 def camera(
     context: typer.Context,
-    name: Annotated[str, typer.Argument(help="A camera's name, or a .json file.")] = "",
+    name: Annotated[str, typer.Argument(help="A camera's name, a .json file, or an II-picture.")] = "",
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="A folder for L and D maps; with --design a camera file, .json."),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, Rig, preset, sub_images
-from ii_core.base.files import read_image, write_image
+from ii_core.base.files import read_depth, read_image, write_image
 from ii_core.formats.pfm import read_pfm
 from tests.support.slow import first_fast
 
@@ -79,11 +79,45 @@ def test_refused(run, refused, shot, tmp_path):
     refused(run("import", shot, "-o", out), "is no folder and its name says no _qsCxRaA")
     refused(run("import", shot, "--grid", "9by9", "-o", out), "grid is '9by9'")
     refused(run("import", shot, "--ei-pixels", "0x3", "-o", out), "ei-pixels is '0x3'")
-    refused(run("import", tmp_path / "none", "-o", out), "is no folder")
+    refused(run("import", tmp_path / "none", "-o", out), "none does not exist")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "x").touch()
     refused(run("components", shot, "-o", tmp_path / "full"), "is not empty: --force")
     assert not out.exists()
+
+
+def test_a_row_of_cameras_has_depth_and_its_camera_is_taken_from_the_picture(run, refused, tmp_path):
+    """A wall 700 mm before five cameras, 20 mm apart: columns move by 20 · 50 / (36/64) · (1/700 − 1/900) px a view."""
+    step = 20 * 50 / (36 / 64) * (1 / 700 - 1 / 900)
+    waves = np.random.default_rng(1).uniform(-1, 1, (6, 3))
+    rows, columns = np.mgrid[:48, :64].astype(float)
+    for u in range(5):
+        x = columns + step * (u - 2)
+        light = sum(np.sin(a * x + b * rows + 9 * c) for a, b, c in waves)
+        (tmp_path / "v").mkdir(exist_ok=True)
+        write_image(
+            tmp_path / "v" / f"im{u}.png", np.repeat((127 + 20 * light).astype(np.uint8)[..., None], 3, axis=2)
+        )
+    row, depth = tmp_path / "row.png", tmp_path / "d.exr"
+    rig = ("--baseline-mm", 20, "--focal-mm", 50, "--sensor-mm", 36, "--focus-mm", 900)
+    refused(run("import", tmp_path / "v", "-o", row), "give the grid, as in 9x1")
+    said = run("import", tmp_path / "v", "--grid", "5x1", "-o", row, *rig)[1]
+    assert "numbers run left to right (" in said and "then" not in said
+    assert run("depth", row, "-o", depth)[0] == 0
+    assert np.median(read_depth(depth)) == pytest.approx(700, rel=0.005)
+    assert run("export", row, "--to", "hci", "-o", tmp_path / "hci")[0] == 0
+    assert run("import", tmp_path / "hci", "-o", tmp_path / "again.png")[0] == 0
+    camera, again = IIPicture.load(row).camera, IIPicture.load(tmp_path / "again.png").camera
+    for name in ("lens_pitch_mm", "viewer_mm", "gap_mm", "pixel_pitch_mm", "origin_mm", "start_mm", "packed"):
+        assert getattr(again, name) == pytest.approx(getattr(camera, name), rel=1e-9), name
+    assert "5×1 px, lens pitch 10.12" in run("camera", row)[1] and preset(row) == camera
+    assert run("render", "apples", "--camera", row, "-o", tmp_path / "a.png")[0] == 0
+    assert IIPicture.load(tmp_path / "a.png").camera == camera
+    bare = tmp_path / "bare.png"
+    camera_of_none = IIPicture(IIPicture.load(row).pixels, (64, 48), (5, 1))
+    camera_of_none.save(bare)
+    refused(run("camera", bare), "the picture has no camera")
+    refused(run("camera", tmp_path / "v" / "im0.png"), "im0.png.json does not exist")
 
 
 def test_imported_views_get_a_camera(run, refused, shot, tmp_path):
