@@ -87,7 +87,7 @@ def test_refused(run, refused, shot, tmp_path):
 
 
 def test_a_row_of_cameras_has_depth_and_its_camera_is_taken_from_the_picture(run, refused, tmp_path):
-    """A wall 700 mm before five cameras, 20 mm apart: columns move by 20 · 50 / (36/64) · (1/700 − 1/900) px a view."""
+    """A wall 700 mm before five cameras: columns move by 20 · 50 / (36/64) · (1/700 − 1/900) px a view."""
     step = 20 * 50 / (36 / 64) * (1 / 700 - 1 / 900)
     waves = np.random.default_rng(1).uniform(-1, 1, (6, 3))
     rows, columns = np.mgrid[:48, :64].astype(float)

@@ -76,7 +76,7 @@ def test_disparity_has_both_signs_and_the_closed_form(z):
 @pytest.mark.parametrize("views", [(9, 1), (1, 7), (3, 5)], ids=str)
 @pytest.mark.parametrize("z", [600.0, 1600.0])
 def test_rows_and_other_grids_have_depth_in_millimetres(views, z):
-    """A wall whose pattern no shift repeats: its depth, the same wall refocused, and the middle view of each camera."""
+    """A wall whose pattern no shift repeats: its depth, the wall refocused, and the middle view of each grid."""
     picture = seen(RIG.camera(views, (64, 48)), lambda x, y: waves(x, y) * np.cos(x * y / 9000), z)
     stack, camera = sub_images(picture), picture.camera
     found = estimate_depth(picture)
