@@ -68,8 +68,10 @@ def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IIC
         path = path.with_name(f"{path.name}.json")
     if path.suffix == ".json":
         data, stem, folder = _read(path), path.stem, path.parent
-        if data.get("format") == "ii-picture" and (data := data.get("camera")) is None:
-            raise ValueError(f"{path}: the picture has no camera: `camera --set` gives it one")
+        if data.get("format") == "ii-picture":
+            if not data.get("camera"):
+                raise ValueError(f"{path}: the picture has no camera: `camera --set` gives it one")
+            data = data["camera"]
     else:
         if stem not in (known := _read(PACKAGE)):
             names = ", ".join([*known, *ALIASES])

@@ -14,6 +14,7 @@ from ..base.colour import linear, srgb
 from ..camera.camera import IICamera
 from ..camera.optics import Lenslet, unit_disk
 from ..picture.picture import IIPicture
+from ..picture.view import lens_array_mm
 from .eye_kernel import Emitters, Gaze, Lenses, Panel, Refraction, see
 from .model import LAYOUTS, DisplayModel
 
@@ -141,9 +142,10 @@ def eye_image(
         y=float(eye.position_mm[1] - camera.origin_mm[1]),
         blur=0.0 if eye.focus_mm is None else 1 - distance / eye.focus_mm,
     )
-    lens = _refraction(display, distance, -1.0 if picture.erect else 1.0)
+    sign = -1.0 if picture.erect else 1.0
+    lens = _refraction(display, distance, sign)
     table, emitters = _table(picture.pixels.dtype), _emitters(display)
-    see(picture.pixels, table, gaze, _lenses(display, half), _panel(camera), lens, emitters, light, seen)
+    see(picture.pixels, table, gaze, _lenses(display, half), _panel(camera, sign), lens, emitters, light, seen)
     return EyeImage(light, seen)
 
 
@@ -159,7 +161,7 @@ def _distance(camera: IICamera, eye: Eye) -> float:
 def _half(display: DisplayModel) -> NDArray[np.float64]:
     """Return half the size of the lens array; to the bit the panel's if pitches match, as in `view_positions`."""
     camera = display.camera
-    own = zip(camera.size_mm, camera.lens_pitch_mm, display.lens_pitch_mm, camera.lenses, strict=True)
+    own = zip(lens_array_mm(camera), camera.lens_pitch_mm, display.lens_pitch_mm, camera.lenses, strict=True)
     return np.array([(size if pitch == made else count * pitch) / 2 for size, made, pitch, count in own])
 
 
@@ -173,12 +175,15 @@ def _lenses(display: DisplayModel, half: NDArray[np.float64]) -> Lenses:
     )  # fmt: skip
 
 
-def _panel(camera: IICamera) -> Panel:
-    """Return the panel of a camera's pixels."""
-    (pitch_x, pitch_y), (width, height), (u, v) = camera.lens_pitch_mm, camera.size_mm, camera.ei_pixels
+def _panel(camera: IICamera, sign: float) -> Panel:
+    """Return the panel of a camera's pixels; ``sign`` is −1 for erect elementary images."""
+    (pitch_x, pitch_y), (width, height), (u, v) = camera.lens_pitch_mm, lens_array_mm(camera), camera.ei_pixels
+    aside = 0.0
+    if camera.viewer_mm is not None:
+        aside = sign * camera.gap_mm / (camera.viewer_mm * camera.pixel_pitch_mm)
     return Panel(
         pitch_x=float(pitch_x), pitch_y=float(pitch_y), half_x=width / 2, half_y=height / 2,
-        pixel=float(camera.pixel_pitch_mm), u=u, v=v,
+        aside=aside, pixel=float(camera.pixel_pitch_mm), u=u, v=v,
     )  # fmt: skip
 
 

@@ -41,12 +41,13 @@ class Lenses(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """The panel: lens array that its picture is made for, and pixels."""
+    """The panel: lens array that its picture is made for, its elementary images, and pixels."""
 
     pitch_x: float
     pitch_y: float
     half_x: float
     half_y: float
+    aside: float  # of an elementary image from the lens it is made for: pixels by the lens's place
     pixel: float
     u: int
     v: int
@@ -134,10 +135,11 @@ def _path(gaze, lenses, panel, lens, i, j, r):
     if off_x * off_x + off_y * off_y > lens.radius * lens.radius:
         return Path(MISSED, MISSED, 0.0, 0.0, 0.0, 0.0)
     # distance in pixels of that lens from the lens that its elementary image is made for
-    wrong_x = (cx - ((k + 0.5) * panel.pitch_x - panel.half_x)) / panel.pixel
-    wrong_y = (cy - (panel.half_y - (l + 0.5) * panel.pitch_y)) / panel.pixel
+    made_x, made_y = (k + 0.5) * panel.pitch_x - panel.half_x, panel.half_y - (l + 0.5) * panel.pitch_y
+    wrong_x, wrong_y = (cx - made_x) / panel.pixel, (cy - made_y) / panel.pixel
     px = k * panel.u + (panel.u - 1) / 2 - from_x * lens.to_pixels - off_x * lens.spread - wrong_x
-    down = from_y * lens.to_pixels + off_y * lens.spread + wrong_y
+    px += made_x * panel.aside
+    down = from_y * lens.to_pixels + off_y * lens.spread + wrong_y - made_y * panel.aside
     py = l * panel.v + (panel.v - 1) / 2 + down * lens.vertical
     return Path(px, py, from_x, from_y, off_x, off_y)
 

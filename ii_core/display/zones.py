@@ -19,7 +19,8 @@ class ViewingZone(NamedTuple):
     centre_mm : (x, y)
         Centre of the zone, from the display's axis.
     size_mm : (width, height)
-        Size of the zone; negative if there is none, since some lenses show their neighbours' images everywhere.
+        Size of the zone; negative if there is none, since some lenses show their neighbours' images everywhere. The
+        height is infinite without vertical parallax.
     period_mm : (x, y)
         Distance to the neighbouring side zones, in which lenses show their neighbours' images.
     """
@@ -33,9 +34,10 @@ class ViewingZone(NamedTuple):
 def viewing_zone(display: DisplayModel, distance_mm: float) -> ViewingZone:
     """Return the viewing zone at a distance from the lens plane.
 
-    A lens at c, whose elementary image of width P is made for a lens at c₀, shows it to an eye at x while
-    |c − c₀ + (c − x)·g/d| ≤ P/2: over c + (c − c₀)·d/g ± P·d/2g. The zone is the intersection of these ranges for
-    the lenses in the corners of the array.
+    A lens at c, whose elementary image of width P at e is made for a lens at c₀, shows it to an eye at x while
+    |c − e + (c − x)·g/d| ≤ P/2: over c + (c − e)·d/g ± P·d/2g. Where e = c₀ + c₀·Λ/D stands on the panel, D being the
+    camera's ``viewer_mm``; c − e changes its sign if the camera's elementary images are erect. The zone is the
+    intersection of these ranges for the lenses in the corners of the array.
 
     Parameters
     ----------
@@ -54,10 +56,12 @@ def viewing_zone(display: DisplayModel, distance_mm: float) -> ViewingZone:
     corners = np.array([[i, j] for i in (-0.5, 0.5) for j in (-0.5, 0.5)]) * counts
     made, lens = corners * display.camera.lens_pitch_mm, corners * display.lens_pitch_mm
     place = lens @ np.array([[cos, sin], [-sin, cos]]) + display.shift_mm
-    middle = place + (place - made) * far
+    middle = place + ((place - made) * _side(display) - made * _aside(display)) * far
     period = np.array(display.ei_pitch_mm) * far
     low, high = middle.max(axis=0) - period / 2, middle.min(axis=0) + period / 2
     centre, size = (low + high) / 2, high - low
+    if not display.camera.vertical_parallax:
+        centre[1], size[1], period[1] = 0, math.inf, math.inf
     return ViewingZone(*((float(a[0]), float(a[1])) for a in (centre, size, period)))
 
 
@@ -65,8 +69,8 @@ def viewing_zone(display: DisplayModel, distance_mm: float) -> ViewingZone:
 def converging_distance(display: DisplayModel) -> tuple[float, float]:
     """Return the distance from the lens plane at which the zones of all lenses coincide, across and up, mm.
 
-    d = g·p/(P − p), P being the pitch of elementary images and p that of lenses: P = p(1 + g/d). Infinite if the
-    pitches are equal.
+    d = g·p/(P − p), P being the pitch of elementary images on the panel and p that of lenses: P = p(1 + g/d).
+    Infinite if the pitches are equal.
 
     Raises
     ------
@@ -74,8 +78,9 @@ def converging_distance(display: DisplayModel) -> tuple[float, float]:
         If elementary images are closer to each other than lenses: the zones then diverge.
     """
     found = []
-    for image, lens in zip(display.ei_pitch_mm, display.lens_pitch_mm, strict=True):
-        apart = image - lens
+    for made, lens in zip(display.camera.lens_pitch_mm, display.lens_pitch_mm, strict=True):
+        apart = (made - lens) * _side(display) + made * _aside(display)
+        image = lens + apart
         if apart < -1e-9 * image:
             raise ValueError(
                 f"zones never converge: lens_pitch_mm is {lens:g}, elementary images are {image:g} mm wide, and no "
@@ -83,6 +88,17 @@ def converging_distance(display: DisplayModel) -> tuple[float, float]:
             )
         found.append(display.gap_mm * lens / apart if apart > 1e-9 * image else math.inf)
     return found[0], found[1]
+
+
+def _side(display: DisplayModel) -> int:
+    """−1 if elementary images are erect: the panel's pixels are then seen turned by 180° about the lens's axis."""
+    return -1 if display.camera.erect else 1
+
+
+def _aside(display: DisplayModel) -> float:
+    """Distance of an elementary image from its lens as a share of the lens's place, if viewing zones meet."""
+    camera = display.camera
+    return 0.0 if camera.viewer_mm is None else camera.gap_mm / camera.viewer_mm
 
 
 @checked(pupil_mm=number, border_mm=number)

@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from ii_core import IICamera, IIPicture, five_viewpoints, preset, view_image
+from ii_core import IICamera, IIPicture, Rig, five_viewpoints, panel_display, preset, view_image
 from ii_core.base.colour import LINEAR, linear
 from ii_core.camera.optics import Lenslet
 from ii_core.display.eye import Eye, eye_image, see
@@ -35,7 +35,7 @@ def constant(camera, value):
     return IIPicture(pixels, camera.lenses, camera.ei_pixels, camera)
 
 
-FRONT = Eye(position_mm=(0.0, 0.0, -5.0))
+FRONT, DISTANCE = Eye(position_mm=(0.0, 0.0, -5.0)), 30.0
 PLACES = [(0.0, 0.0, -5.0), (0.4, -0.3, -5.0), (3.0, 1.5, -7.0), (-0.9, 0.2, -1.0), (60.0, 0.0, -2.0)]
 
 
@@ -60,6 +60,38 @@ def test_presets_give_the_view_image(name):
         wanted, valid = view_image(picture, place, interpolation="nearest")
         got = eye_image(picture, DisplayModel(camera=made), Eye(position_mm=tuple(place)))
         np.testing.assert_array_equal(got.pixels[valid], wanted[valid])
+
+
+RIG = Rig(baseline_mm=4, focal_mm=50, sensor_mm=36, focus_mm=120)
+MEETING = {
+    "panel": panel_display(size_mm=60, pixels=(160, 96), lens_pitch_mm=2.5, viewer_mm=600).camera,
+    "erect": camera(viewer_mm=40.0, optics=({"kind": "grin"},)),
+    "lenticular": camera(u=6, viewer_mm=30.0, optics=({"kind": "lenticular"},)),
+    "cameras": RIG.camera((5, 5), (24, 16)),
+    "row": RIG.camera((7, 1), (24, 16)),
+    "grid": RIG.camera((3, 5), (24, 16)),
+}
+
+
+@pytest.mark.parametrize("name", MEETING)
+def test_where_viewing_zones_meet_the_view_image_is_seen(name):
+    """To the bit wherever a lens shows its own image, and the zone's border is where one no longer does."""
+    made = MEETING[name]
+    display, picture = DisplayModel(camera=made), noise(made, erect=made.erect)
+    for place in five_viewpoints(made).values():
+        wanted, valid = view_image(picture, place, interpolation="nearest")
+        got = eye_image(picture, display, Eye(position_mm=tuple(place)))
+        np.testing.assert_array_equal(got.pixels[valid], wanted[valid])
+        assert valid.all() and (got.seen == 1).all()
+    np.testing.assert_allclose(converging_distance(display), made.viewer_mm)
+    zone = viewing_zone(display, made.viewer_mm)
+    assert (zone.size_mm[1] < math.inf) == made.vertical_parallax
+    assert zone.size_mm == pytest.approx(zone.period_mm) and zone.centre_mm == pytest.approx((0, 0), abs=1e-6)
+    for distance in (made.viewer_mm, 1.01 * made.viewer_mm):
+        zone = viewing_zone(display, distance)
+        for x in (-0.5, 0.5):
+            inside, outside = ((zone.size_mm[0] + 2e-6 * sign * distance) * x for sign in (-1, 1))
+            assert own_image_seen(display, inside, distance) and not own_image_seen(display, outside, distance)
 
 
 @pytest.mark.parametrize("dtype", [np.uint16, np.float32])
@@ -194,18 +226,17 @@ def test_defocus_of_the_eye_is_the_pupils_geometry():
     assert reach == pytest.approx(pupil * abs(1 - d / focus) / 2, abs=0.02)
 
 
-def own_image_seen(display, x):
+def own_image_seen(display, x, distance=DISTANCE):
     """Return whether all lenses in a row show their own elementary image, whose red is the lens's number, at x."""
     made = display.camera
     pixels = np.zeros((made.pixels[1], made.pixels[0], 3), np.uint8)
     pixels[..., 0] = (np.arange(made.pixels[0]) // made.ei_pixels[0] + 1) * 5
-    picture = IIPicture(pixels, made.lenses, made.ei_pixels, made)
-    eye = Eye(position_mm=(x, 0.0, made.gap_mm - DISTANCE))
+    picture = IIPicture(pixels, made.lenses, made.ei_pixels, made, made.erect)
+    eye = Eye(position_mm=(x + made.origin_mm[0], 0.0, made.origin_mm[2] + made.gap_mm - distance))
     got = eye_image(picture, display, eye).light[made.lenses[1] // 2, :, 0]
     return bool((got == LINEAR[(np.arange(made.lenses[0]) + 1) * 5]).all())
 
 
-DISTANCE = 30.0
 DISPLAYS = [{}, {"gap_mm": 0.15}, {"lens_pitch_mm": 0.0796}, {"shift_mm": (0.01, 0.0)}, {"lens_pitch_mm": 0.0803}]
 
 
