@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -26,26 +27,33 @@ def false_colours(values: NDArray[Any], low: float, high: float) -> NDArray[np.u
     return np.rint(colours).astype(np.uint8)
 
 
-def preview(values: NDArray[Any], unit: str, *, depth: bool = False) -> NDArray[np.uint8]:
+def preview(
+    disparity: NDArray[Any],
+    unit: str,
+    *,
+    told: Callable[[float], Any] = float,
+    pixel: tuple[float, float] = (1.0, 1.0),
+) -> NDArray[np.uint8]:
     """Return a map in false colours with its scale on the right, (rows, columns + scale, 3).
+
+    Colours change with the disparity, near ones bright: no point near infinity or at the lenses takes them all.
 
     Parameters
     ----------
-    values : ndarray, (rows, columns)
+    disparity : ndarray, (rows, columns)
     unit : str
         Written above the scale.
-    depth : bool
-        Values are depths: near ones look bright, as large disparities do, and colours change with 1/z, so that a few
-        points near infinity do not take all of them; with z if there are depths on both sides of 0.
+    told : callable
+        What the scale says of a disparity: its depth, say.
+    pixel : (width, height)
+        Shape of a pixel: lens pitch across and down.
     """
-    finite = values[np.isfinite(values)]
+    finite = disparity[np.isfinite(disparity)]
     low, high = (float(x) for x in np.quantile(finite, [0.005, 0.995])) if finite.size else (0.0, 1.0)
-    inverse = depth and low > 0
-    with np.errstate(divide="ignore"):
-        shown = np.where(values > 0, 1 / values, np.inf) if inverse else -values if depth else values
-    first, last = (1 / high, 1 / low) if inverse else (-high, -low) if depth else (low, high)
-    zoom = max(1, -(-300 // min(values.shape)))  # small views are enlarged, so that the scale can be read
-    map_ = false_colours(np.where(np.isfinite(values), shown, np.nan), first, last).repeat(zoom, 0).repeat(zoom, 1)
+    wide, tall = (max(1, round(side / min(pixel))) for side in pixel)
+    rows, columns = disparity.shape
+    zoom = max(1, -(-300 // min(rows * tall, columns * wide)))  # small views: so that the scale can be read
+    map_ = false_colours(disparity, low, high).repeat(zoom * tall, 0).repeat(zoom * wide, 1)
     rows = map_.shape[0]
     canvas = np.full((rows, map_.shape[1] + SCALE, 3), 255, np.uint8)
     canvas[:, :-SCALE] = map_
@@ -57,7 +65,6 @@ def preview(values: NDArray[Any], unit: str, *, depth: bool = False) -> NDArray[
     draw.text((canvas.shape[1] - SCALE + 8, 6), unit, fill=0, font=font)
     for i in range(TICKS):
         part = i / (TICKS - 1)
-        y, value = bottom - 1 - part * (bottom - top - 1), first + part * (last - first)
-        value = 1 / value if inverse else -value if depth else value
-        draw.text((canvas.shape[1] - SCALE + 30, y - 8), f"{value:.4g}", fill=0, font=font)
+        y, value = bottom - 1 - part * (bottom - top - 1), low + part * (high - low)
+        draw.text((canvas.shape[1] - SCALE + 30, y - 8), f"{float(told(value)):.4g}", fill=0, font=font)
     return np.asarray(image)

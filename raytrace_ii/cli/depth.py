@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,8 @@ from .progress import progress_bar, say_done
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from ii_core import IIPicture
 
 
 MILLIMETRES = 65535  # of a 16-bit PNG
@@ -53,7 +56,6 @@ def depth(
     from ii_core.base.files import write_image
     from ii_core.depth.all_views import disparity_of_views
     from ii_core.depth.points import view_points, write_ply
-    from ii_core.depth.preview import preview as picture_of
     from ii_core.picture.disparity import depth_of_disparity
 
     load_plugins(plugin)
@@ -78,7 +80,7 @@ def depth(
     values = found.disparity if disparity else found.depth_mm
     assert values is not None
     if preview is not None:
-        write_image(preview, picture_of(values, "px a view" if disparity else "mm", depth=not disparity))
+        write_image(preview, _false_colours(shown, found.disparity, in_mm=not disparity))
     if whole:
         moved = _as_picture(disparity_of_views(shown, found.disparity, found.view))
         values = moved if disparity or shown.camera is None else depth_of_disparity(shown.camera, moved)
@@ -89,6 +91,18 @@ def depth(
         assert found.depth_mm is not None
         write_ply(points, *view_points(shown, found.depth_mm, found.view))
     say_done(f"{output}: {_about(values, 'px' if disparity else 'mm')}; {(found.confidence >= 0.9).mean():.0%} sure")
+
+
+def _false_colours(field: IIPicture, disparity: NDArray[Any], *, in_mm: bool) -> NDArray[Any]:
+    """Return the preview of a map, whose scale is in pixels or in mm."""
+    from ii_core import depth_of_disparity
+    from ii_core.depth.preview import preview
+
+    camera = field.camera
+    if camera is None:
+        return preview(disparity, "px a view")
+    told, unit = (partial(depth_of_disparity, camera), "mm") if in_mm else (float, "px a view")
+    return preview(disparity, unit, told=told, pixel=camera.lens_pitch_mm)
 
 
 def _about(values: NDArray[Any], unit: str) -> str:

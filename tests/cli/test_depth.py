@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from ii_core import IIPicture, preset
+from ii_core import IIPicture, Rig, depth_of_disparity, disparity_of_depth, preset
 from ii_core.base.colour import linear
 from ii_core.base.files import read_depth, read_image
 from ii_core.depth.preview import preview
@@ -124,11 +124,25 @@ def test_focus_refuses_cameras(run, tmp_path, camera, said):
     assert code == 2 and said in err and not (tmp_path / "f.png").exists()
 
 
-def test_preview_of_depths_beside_infinity():
-    """Colours in steps of z went to one point near infinity, and 20 to 50 mm looked alike."""
-    z = np.array([[20.0, 25.0, 50.0, 1e9]] * 4)
-    colours = preview(z, "mm", depth=True)[0, ::75][:4].astype(int)  # a pixel is shown 75 px wide
-    assert (np.abs(np.diff(colours, axis=0)).sum(axis=1) > 40).all()
+@pytest.mark.parametrize(
+    ("made", "z"),
+    [
+        (Rig(baseline_mm=4, focal_mm=50, sensor_mm=36).camera((5, 5), (4, 4)), [20, 25, 50, 1e9]),
+        (preset("setup1", scale=64), [47, 80, 120, 160]),
+    ],
+    ids=["cameras", "lenses"],
+)
+def test_preview_of_depths_beside_infinity_and_at_the_lenses(made, z):
+    """Steps of z went to one point near infinity, and 20 to 50 mm looked alike; steps of 1/z to one at the lenses."""
+    disparity = np.array([disparity_of_depth(made, z)] * 4)
+    colours = preview(disparity, "mm", told=lambda d: depth_of_disparity(made, d))[0, ::75][:4].astype(int)
+    assert (np.abs(np.diff(colours, axis=0)).sum(axis=1) > 40).all()  # a pixel is shown 75 px wide
+    bright = colours.sum(axis=1)
+    assert (np.diff(bright) < 0).all()
+
+
+def test_preview_has_the_shape_of_the_lens_array():
+    assert preview(np.eye(40), "px", pixel=(8.0, 1.0))[:, :-96].shape == (320, 2560, 3)
 
 
 def test_errors_of_a_map(run, field, tmp_path):
