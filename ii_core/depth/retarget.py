@@ -81,6 +81,7 @@ def retarget(
     A target ray lies between four views of the source. In each, the ray's points lie on a line; the nearest one
     that has the disparity of the view there is where the ray ends. Views that agree on the nearest point are mixed,
     the nearer ones more. If the point is hidden from all four, what lies behind its neighbours is taken.
+    One row of views has no parallax down, nor then has what is made of it.
 
     Parameters
     ----------
