@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..base import checks
 from ..base.parallel import for_each
 from ..camera.camera import Pair
+from ..picture.disparity import rows_per_column
 from ..picture.picture import IIPicture
 from .disparity_kernels import move_to_view
 
@@ -25,7 +26,7 @@ def disparity_of_views(
     Parameters
     ----------
     picture : IIPicture
-        Its structure counts.
+        Its structure and lens pitch count.
     disparity : ndarray, (L, K)
         Pixels a step between views; NaN where it is not known.
     view : (u, v)
@@ -45,10 +46,11 @@ def disparity_of_views(
     if not (0 <= view[0] < u and 0 <= view[1] < v):
         raise ValueError(f"view is {view[0]},{view[1]}: columns 0–{u - 1} and rows 0–{v - 1} are there")
     known, sign = np.ascontiguousarray(disparity, np.float32), -1.0 if picture.erect else 1.0
+    tall = rows_per_column(picture.camera)
     out = np.empty((v, u, down, across), np.float32)
 
     def move(at: Pair) -> None:
-        step = sign * (at[0] - view[1]), sign * (at[1] - view[0])
+        step = sign * tall * (at[0] - view[1]), sign * (at[1] - view[0])
         move_to_view(known, np.float32(step[0]), np.float32(step[1]), filled, out[at])
 
     for_each(move, list(np.ndindex(v, u)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..base.colour import srgb
 from ..camera.camera import Pair
 from ..picture.component import sub_images
+from ..picture.disparity import rows_per_column
 from ..picture.picture import IIPicture
 from .disparity_kernels import Views
 
@@ -21,7 +22,8 @@ CODES = 257.0  # 16-bit codes in one of 8 bits
 def views_around(picture: IIPicture, view: Pair) -> Views:
     """Return all views as 16-bit sRGB planes, the reference first, with their steps and half-lines.
 
-    A point of disparity D at pixel x of the reference is at x − p·D in the view whose step is p.
+    A point of disparity D at pixel x of the reference is at x − p·D in the view whose step is p. Steps down are in
+    the pixels of steps across: times `rows_per_column`.
 
     Parameters
     ----------
@@ -37,7 +39,9 @@ def views_around(picture: IIPicture, view: Pair) -> Views:
     steps = np.array(order, np.float32) - np.array([view[1], view[0]], np.float32)
     if picture.erect:
         steps = -steps
-    return Views(pixels, steps, half_lines(steps))
+    lines = half_lines(steps)
+    steps[:, 0] *= rows_per_column(picture.camera)
+    return Views(pixels, steps, lines)
 
 
 def codes16(pixels: NDArray[Any]) -> NDArray[np.uint16]:

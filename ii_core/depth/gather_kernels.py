@@ -67,11 +67,12 @@ def _near(depths, j, i, y, x):
 
 
 @lean_kernel
-def look_up(views, depths, low, high, order, places, total, ends, mask, first, last):
+def look_up(views, depths, low, high, order, tall, places, total, ends, mask, first, last):
     """Add the light of rays at ``places`` (x, y, u, v) to ``total``; ``mask`` 2 is seen, 1 filled, 0 outside.
 
     ``ends`` becomes the disparity where each ray ends.
-    ``depths`` are shifts of a point in x and y from view to view; ``order`` is 1 if large shifts are near, else −1.
+    ``depths`` are shifts of a point in x from view to view, and ``tall`` times these in y; ``order`` is 1 if large
+    shifts are near, else −1.
     """
     rows, cols, height, width = views.shape[:4]
     longest = max(SHIFT, min(height, width) * SHIFT_SHARE)
@@ -90,7 +91,7 @@ def look_up(views, depths, low, high, order, places, total, ends, mask, first, l
                 j, i = (below if q & 2 else top), (right if q & 1 else left)
                 if (q & 1 and right == left) or (q & 2 and below == top):
                     continue
-                d, clear = _end(depths, j, i, y, x, v - j, u - i, low, high, order)
+                d, clear = _end(depths, j, i, y, x, tall * (v - j), u - i, low, high, order)
                 if q == 0 or order * d < order * behind:
                     behind = d
                 if not clear:
@@ -100,7 +101,8 @@ def look_up(views, depths, low, high, order, places, total, ends, mask, first, l
                     dy, dx = v - (below if p & 2 else top), u - (right if p & 1 else left)
                     if (p & 1 and right == left) or (p & 2 and below == top):
                         continue
-                    there = _near(depths, below if p & 2 else top, right if p & 1 else left, y + d * dy, x + d * dx)
+                    sy, sx = y + d * tall * dy, x + d * dx
+                    there = _near(depths, below if p & 2 else top, right if p & 1 else left, sy, sx)
                     if abs(there - d) <= limit:
                         support += max(1.0 - abs(dy), 1e-6) * max(1.0 - abs(dx), 1e-6)
                 if support > most:
@@ -113,9 +115,9 @@ def look_up(views, depths, low, high, order, places, total, ends, mask, first, l
                 if (q & 1 and right == left) or (q & 2 and below == top):
                     continue
                 w = max(1.0 - abs(v - j), 1e-6) * max(1.0 - abs(u - i), 1e-6)
-                shift, share = _place(depths, j, i, y, x, v - j, u - i, at, low, high, longest)
+                shift, share = _place(depths, j, i, y, x, tall * (v - j), u - i, at, low, high, longest)
                 w *= share
-                sy = y + min(max(shift * (v - j), -longest), longest)
+                sy = y + min(max(shift * tall * (v - j), -longest), longest)
                 sx = x + min(max(shift * (u - i), -longest), longest)
                 sy, sx = min(max(sy, 0.0), height - 1.0), min(max(sx, 0.0), width - 1.0)
                 if share < 1.0:  # beside an edge: interpolation would mix both surfaces

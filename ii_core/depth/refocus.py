@@ -13,7 +13,7 @@ from ..base.colour import linear
 from ..base.parallel import over_rows
 from ..camera.camera import Pair
 from ..picture.component import sub_images
-from ..picture.disparity import disparity_of_depth
+from ..picture.disparity import disparity_of_depth, rows_per_column
 from ..picture.picture import IIPicture, peak
 from ..picture.view import camera_of
 from .gather_kernels import add_view
@@ -87,11 +87,11 @@ def focused(
     if given.ndim == 0 and not np.isfinite(given):
         raise ValueError(f"disparity is {given}: a finite number is needed")
     shift = np.ascontiguousarray(np.broadcast_to(given, (l, k)))
-    stack, sign = sub_images(picture), -1.0 if picture.erect else 1.0
+    stack, sign, tall = sub_images(picture), -1.0 if picture.erect else 1.0, rows_per_column(picture.camera)
     total, mass = np.zeros((l, k, 3)), np.zeros((l, k))
     own = _light(stack[at[1], at[0]], bokeh)
     for j, i in zip(*np.nonzero(pupil), strict=True):
-        steps = sign * (j - at[1]), sign * (i - at[0]), pupil[j, i], math.inf if limit is None else limit
+        steps = sign * tall * (j - at[1]), sign * (i - at[0]), pupil[j, i], math.inf if limit is None else limit
         image = _light(stack[j, i], bokeh)
 
         def add(first: int, last: int, image: Any = image, steps: Any = steps) -> None:

@@ -14,6 +14,7 @@ from ..base.colour import srgb
 from ..base.parallel import for_each, over_rows
 from ..camera.camera import IICamera, Pair
 from ..picture.component import sub_images
+from ..picture.disparity import rows_per_column
 from ..picture.picture import DTYPES, IIPicture, peak
 from ..picture.view import camera_of
 from .gather_kernels import look_up
@@ -55,6 +56,7 @@ class _Views(NamedTuple):
     low: float
     high: float
     order: int
+    tall: float  # `rows_per_column`
 
 
 @checks.checked(
@@ -121,7 +123,7 @@ def retarget(
     known = np.clip(np.where(np.isfinite(known), known, np.float32(low)), low, high) * np.float32(sign)
     views = np.stack([[_light(view, 1.0) for view in row] for row in sub_images(picture)])
     least, most = sorted((sign * low, sign * high))
-    seen = _Views(views, known, least, most, 1 if sign > 0 else -1)
+    seen = _Views(views, known, least, most, 1 if sign > 0 else -1, rows_per_column(source))
     halves = _refined(seen, workers, progress) if refine else None
     (u0, v0) = ((n > 1) / 2 for n in (u, v))  # the place of view 0 of the source among halves
     width, height = camera.pixels
@@ -186,7 +188,7 @@ def _refined(seen: _Views, workers: int | None, progress: Progress | None) -> _V
     parts += (seen.light - parts.mean(axis=(1, 3)))[:, None, :, None]
     np.clip(light, 0, None, out=light)
     ended /= 2
-    return _Views(light, ended, float(ended.min()), float(ended.max()), seen.order)
+    return _Views(light, ended, float(ended.min()), float(ended.max()), seen.order, seen.tall)
 
 
 def _codes(light: NDArray[np.float32], dtype: np.dtype[Any]) -> NDArray[Any]:

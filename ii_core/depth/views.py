@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera.camera import IICamera
-from ..picture.disparity import disparity_of_depth
+from ..picture.disparity import disparity_of_depth, rows_per_column
 from ..picture.picture import IIPicture
 from .layers import Floats
 from .lens_tables import Table
@@ -54,7 +54,7 @@ def view_tables(
     sign = -1 if erect else 1
     return (
         _view_table(k, u, sign * across, across, disparity, nearest),
-        _view_table(l, v, sign * down, down, disparity, nearest),
+        _view_table(l, v, sign * down, down, disparity * rows_per_column(camera), nearest),
     )
 
 

@@ -4,6 +4,9 @@ A point h beyond the lens plane moves by −δP·h / (Λ·δL·(1 + h/d)) view p
 which viewing zones meet, infinite if they are parallel. It is positive before the lens plane and negative behind it:
 the sign of the HCI benchmark.
 
+Disparity is that across. Where lenses stand closer down than across, as hexagonal ones do, a point moves by more
+view pixels down than across: see `rows_per_column`.
+
 Lenses before the array image the scene to both sides of the lens plane: h is then that of the paraxial image.
 """
 
@@ -23,6 +26,11 @@ def _measures(camera: IICamera) -> tuple[float, float]:
     """Return δP/(Λ·δL), in view pixels a step and mm, and 1/d."""
     step = camera.pixel_pitch_mm / (camera.gap_mm * camera.lens_pitch_mm[0])
     return step, 0.0 if camera.viewer_mm is None else 1 / camera.viewer_mm
+
+
+def rows_per_column(camera: IICamera | None) -> float:
+    """Return the rows of a view by which a point moves from view to view down, over the columns of those across."""
+    return 1.0 if camera is None else camera.lens_pitch_mm[0] / camera.lens_pitch_mm[1]
 
 
 def _relayed(camera: IICamera, z_mm: Any, *, back: bool) -> Any:

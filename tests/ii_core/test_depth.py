@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from ii_core import IICamera, IIPicture, Rig, depth_of_disparity, disparity_of_depth, estimate_depth
+from ii_core import (
+    IICamera,
+    IIPicture,
+    Rig,
+    depth_of_disparity,
+    disparity_of_depth,
+    estimate_depth,
+    retarget,
+    sub_images,
+)
 from ii_core.base.colour import srgb
 from ii_core.base.jit import lean_kernel
 from ii_core.camera.optics import Lens
@@ -27,8 +36,10 @@ from ii_core.depth.estimate import (
     refined,
     spaced,
 )
+from ii_core.depth.focus import depth_from_focus
 from ii_core.depth.highlights import highlights
 from ii_core.depth.points import view_points
+from ii_core.depth.refocus import focused
 from ii_core.picture.assumed import with_assumed_camera
 from tests.support.slow import first_fast
 
@@ -81,6 +92,42 @@ def test_disparity_of_a_slanted_plane(form):
     assert np.median(error) < 0.02 and (error > 0.07).mean() < 0.12
     assert found.view == (picture.ei_pixels[0] // 2, picture.ei_pixels[1] // 2) and found.depth_mm is None
     assert found.disparity.shape == found.confidence.shape == truth.shape
+
+
+@pytest.mark.parametrize("ei", [(7, 5), (5, 7)], ids=str)
+@pytest.mark.parametrize("meeting", [{}, {"viewer_mm": 60.0, "start_mm": 60.0}], ids=["parallel", "meeting"])
+def test_lenses_closer_down_than_across_or_farther(ei, meeting):
+    """Rays to a textured wall: its depth, also from other views and from focus, and the wall focused."""
+    made = IICamera(
+        pixels=(48 * ei[0], 40 * ei[1]), lenses=(48, 40), pixel_pitch_mm=0.1, gap_mm=2.0, **meeting,
+    )  # fmt: skip
+    z, (across, down) = 20.0, made.lens_pitch_mm
+
+    def wall(camera):
+        start, way = camera.rays()
+        place = start + (z - start[..., 2:]) / way[..., 2:] * way
+        return texture(place[..., 0] / across, place[..., 1] / down)
+
+    light = wall(made)
+    picture = IIPicture(np.rint(65535 * light).astype(np.uint16), made.lenses, made.ei_pixels, made)
+    truth = float(disparity_of_depth(made, z))
+    assert abs(truth) > 0.5 and (across > down) == (ei[0] > ei[1])
+    found = estimate_depth(picture, low=-4.0, high=4.0)
+    error = np.abs(found.disparity - truth)[6:-6, 6:-6]
+    assert np.median(error) < 0.02 and (error > 0.07).mean() < 0.12
+    square = np.zeros((40, 48))
+    square[20:24, 20:24] = 4
+    below = disparity_of_views(picture, square, found.view)[found.view[1] + 1, found.view[0]]
+    assert np.argwhere(below)[:, 0].mean() == pytest.approx(21.5 - 4 * across / down, abs=0.5)
+    own, inner = sub_images(picture)[found.view[1], found.view[0]], (slice(10, -10), slice(10, -10))
+    sharp, _ = focused(picture, truth)
+    assert np.abs(srgb(sharp) - own / 65535)[inner].max() < 0.02  # between pixels, by cubics
+    finer = replace(made, pixels=(2 * made.pixels[0], 2 * made.pixels[1]), pixel_pitch_mm=0.05)
+    other = retarget(picture, finer, np.full((ei[1], ei[0], 40, 48), truth, np.float32))
+    error = np.abs(other.picture.pixels / 65535 - wall(finer)).max(axis=2)
+    assert (other.mask == 2).mean() > 0.8 and np.quantile(error[other.mask == 2], 0.9) < 0.01
+    layers = z + np.array([-8.0, -4.0, 0.0, 4.0, 8.0])
+    assert (depth_from_focus(picture, layers_mm=layers, method="robust").layer[inner] == 2).mean() > 0.95
 
 
 def disc(front, back, size=(72, 60), views=7, radius=17.0):

@@ -9,6 +9,7 @@ from ii_core import IICamera, IIPicture, disparity_of_depth, orthoscopic, preset
 from ii_core.base.files import read_image
 
 PARALLEL = IICamera(pixels=(120, 100), lenses=(24, 20), pixel_pitch_mm=0.1, gap_mm=1.0)
+SQUAT = IICamera(pixels=(120, 120), lenses=(24, 30), pixel_pitch_mm=0.1, gap_mm=1.0)  # lenses of 0.5×0.4 mm
 MEETING = IICamera(pixels=(120, 100), lenses=(24, 20), pixel_pitch_mm=0.1, gap_mm=1.0, start_mm=40, viewer_mm=40)
 
 
@@ -38,7 +39,7 @@ def test_upright_elementary_images_of_the_same_lenses():
     np.testing.assert_allclose(made.picture.pixels, orthoscopic(picture).pixels, atol=1e-4)
 
 
-@pytest.mark.parametrize("source", [PARALLEL, MEETING], ids=["parallel", "meeting"])
+@pytest.mark.parametrize("source", [PARALLEL, MEETING, SQUAT], ids=["parallel", "meeting", "squat"])
 def test_a_wall_through_cameras_of_other_lenses_and_pixels(source):
     picture, disparity = plane_through(source, 6.0)
     target = IICamera(pixels=(112, 91), lenses=(16, 13), pixel_pitch_mm=0.09, gap_mm=1.3)
@@ -66,15 +67,14 @@ def test_a_wall_behind_a_main_lens():
 
 def test_a_hole_beside_a_near_square_is_filled_by_the_wall():
     """A quarter of a view outside the last one, the wall beside the square was hidden from both views."""
-    two = IICamera(pixels=(48, 20), lenses=(24, 20), pixel_pitch_mm=0.1, gap_mm=1.0, lens_pitch_mm=(0.2, 0.1))
+    row = {"lenses": (24, 20), "gap_mm": 1.0, "lens_pitch_mm": 0.2, "packed": True}
+    two = IICamera(pixels=(48, 20), pixel_pitch_mm=0.1, **row)
     disparity = np.full((1, 2, 20, 24), -3.0, np.float32)
     disparity[0, :, 8:12, 8:12] = -0.2  # nearer; in both views at the same pixels
     pixels = np.full((20, 24, 2, 3), 60, np.uint8)
     pixels[8:12, 8:12] = 200
     picture = IIPicture(pixels.reshape(20, 48, 3), two.lenses, two.ei_pixels, two)
-    finer = IICamera(
-        pixels=(96, 40), lenses=(24, 20), pixel_pitch_mm=0.05, gap_mm=1.0, lens_pitch_mm=(0.2, 0.1)
-    )  # pixels at views −0.25, 0.25, 0.75 and 1.25
+    finer = IICamera(pixels=(96, 40), pixel_pitch_mm=0.05, **row)  # pixels at views −0.25, 0.25, 0.75 and 1.25
     made = retarget(picture, finer, disparity)
     lenses = made.mask.reshape(20, 2, 24, 4)[:, 0], made.picture.pixels.reshape(20, 2, 24, 4, 3)[:, 0, ..., 0]
     assert (lenses[0][8:12, 12, 3] == 1).all() and (lenses[1][8:12, 12, 3] == 60).all()
