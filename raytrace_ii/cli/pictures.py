@@ -258,9 +258,11 @@ def set_camera(field: Path, text: str) -> None:
     if form == ("angle",):
         camera = with_assumed_camera(replace(picture, camera=None), parts["angle"]).camera
     elif "gap" in form:
+        packed = picture.camera is not None and picture.camera.packed  # a row of cameras: its lenses stay square
         camera = IICamera(
             name=field.stem, pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=parts["pixel"],
-            gap_mm=parts["gap"],
+            gap_mm=parts["gap"], packed=packed,
+            lens_pitch_mm=picture.ei_pixels[0] * parts["pixel"] if packed else None,  # type: ignore[arg-type]
         )  # fmt: skip
     else:
         rig = Rig(**{f"{name}_mm": value for name, value in parts.items()})

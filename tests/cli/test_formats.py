@@ -113,6 +113,9 @@ def test_a_row_of_cameras_has_depth_and_its_camera_is_taken_from_the_picture(run
     assert "5×1 px, lens pitch 10.12" in run("camera", row)[1] and preset(row) == camera
     assert run("render", "apples", "--camera", row, "-o", tmp_path / "a.png")[0] == 0
     assert IIPicture.load(tmp_path / "a.png").camera == camera
+    assert run("camera", row, "--set", "pixel=0.1,gap=2")[0] == 0
+    square = IIPicture.load(row).camera
+    assert square.packed and square.lens_pitch_mm == pytest.approx((0.5, 0.5))
     bare = tmp_path / "bare.png"
     camera_of_none = IIPicture(IIPicture.load(row).pixels, (64, 48), (5, 1))
     camera_of_none.save(bare)
