@@ -39,6 +39,8 @@ class Views:
         Measures of the cameras, if the layout holds them.
     positions : Positions, optional
         Grid of the cameras, if names hold their places.
+    aspect : float, optional
+        Width over height of a view as it is shown, if the layout says so; else its pixels are square.
     """
 
     shape: tuple[int, int]
@@ -47,6 +49,7 @@ class Views:
     structure: dict[str, Any] | None = None
     rig: Rig | None = None
     positions: Positions | None = None
+    aspect: float | None = None
 
     def middle(self, shape: Pair) -> Views:
         """Return the middle views, so many along the first and the second number; ValueError if there are fewer."""

@@ -45,7 +45,8 @@ def quilt_views(path: Path, grid: Pair | None) -> Views:
         top = height - (up + 1) * tile_height
         return pixels[top : top + tile_height, right * tile_width : (right + 1) * tile_width]
 
-    return Views(shape=(1, rows * cols), read=tile, known=WHOLE_ORDER)
+    aspect = float(match[3]) if match and match[3] and float(match[3]) else None
+    return Views(shape=(1, rows * cols), read=tile, known=WHOLE_ORDER, aspect=aspect)
 
 
 def quilt_pixels(views: Iterable[NDArray[Any]], tiles: Pair) -> NDArray[Any]:

@@ -159,7 +159,7 @@ def import_(
     check_type(output, made.pixels.dtype.name)
     nominal = made.camera is None and (views is None or views.structure is None)
     if nominal:
-        made = with_assumed_camera(made)
+        made = with_assumed_camera(made, aspect=None if views is None else views.aspect)
     made.save(output)
     if true is not None and depth is not None:
         write_image(depth, true)

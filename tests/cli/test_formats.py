@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ii_core import IIPicture, Rig, preset, sub_images
+from ii_core import IIPicture, Rig, preset, sub_images, with_assumed_camera
 from ii_core.base.files import read_depth, read_image, write_image
 from ii_core.formats.pfm import read_pfm
 from tests.support.slow import first_fast
@@ -47,6 +47,25 @@ def test_quilt_and_mosaic(run, shot, tmp_path):
     assert run("export", shot, "--to", "mosaic", "-o", tmp_path / "m.png")[0] == 0
     assert run("import", tmp_path / "m.png", "--ei-pixels", "16x16", "-o", tmp_path / "mm.png")[0] == 0
     np.testing.assert_array_equal(IIPicture.load(tmp_path / "mm.png").pixels, original.pixels)
+
+
+def test_a_quilt_keeps_the_aspect_of_its_display(run, tmp_path):
+    """Tiles of 24×20 px fill a display of 1.6:1, as those of 819×455 px do on a Looking Glass of 15.6 inches."""
+    tiles = np.random.default_rng(2).integers(0, 256, (40, 72, 3), np.uint8)
+    write_image(tmp_path / "q_qs3x2a1.6.png", tiles)
+    assert run("import", tmp_path / "q_qs3x2a1.6.png", "-o", tmp_path / "p.png")[0] == 0
+    picture = IIPicture.load(tmp_path / "p.png")
+    across, down = picture.camera.lens_pitch_mm
+    assert (24 * across) / (20 * down) == pytest.approx(1.6) and picture.camera.packed
+    out = run("export", tmp_path / "p.png", "--to", "quilt", "-o", tmp_path / "back.png")[1]
+    assert "a1.6.png" in out
+    assert (
+        run("display", tmp_path / "p.png", "--as", "simulation", "--size", "160x100", "-o", tmp_path / "s.png")[0]
+        == 0
+    )
+    assert read_image(tmp_path / "s.png").any(axis=2).mean() > 0.97  # the whole of a window of its aspect
+    with pytest.raises(ValueError, match="aspect is -1"):
+        with_assumed_camera(IIPicture(tiles, (24, 20), (3, 2)), aspect=-1)
 
 
 def test_flips_are_overridden(run, shot, tmp_path):
