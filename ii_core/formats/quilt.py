@@ -23,10 +23,10 @@ QUILT = re.compile(r"_qs(\d+)x(\d+)(?:a(\d+(?:\.\d+)?))?")
 
 def quilt_views(path: Path, grid: Pair | None) -> Views:
     """Return the views of a quilt; ``grid`` is (columns, rows) of tiles, by default that of the name."""
-    if not path.exists():
-        raise FileNotFoundError(f"{path} does not exist")
     match = QUILT.search(path.stem)
     if match is None and grid is None:
+        if not path.exists():
+            raise FileNotFoundError(f"{path} does not exist")
         raise ValueError(
             f"{path} is no folder and its name says no _qsCxRaA: a quilt needs its grid of tiles, a lenslet picture "
             "its white picture or the pixels under a lens"

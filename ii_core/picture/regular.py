@@ -21,9 +21,7 @@ from ..base import checks
 from ..base.jit import exact_stage_kernel, kernel
 from ..base.parallel import over_rows
 from ..camera.camera import MOST_PIXELS, IICamera, Pair, whole_pair
-from ..camera.elements import LensModel
 from ..camera.lattice import Lattice
-from ..camera.optics import Lenslet, Pinhole, SphericalLenslet
 from .picture import IIPicture, picture_order
 
 Ints = NDArray[np.int32]
@@ -56,12 +54,10 @@ def smallest_rectangle(picture: IIPicture) -> tuple[IIPicture, Mask]:
     Returns
     -------
     picture : IIPicture
-        Lenses (K, L) of (U, V) pixels. Its camera has pixel pitch δP·p/U and gap Λ·p/U, where p is the lens pitch
-        across in pixels. These keep the directions of rays and the positions of lenses, with five exceptions. Lens
-        centres move to the centres of their rectangles, by less than a pixel along each axis (more at the edge of the
-        sensor). Vertical positions of lenses are stretched by V·p_x/(U·p_y) about the middle, since pixels are
-        square. Odd rows of a hexagonal array lie half a pitch too far left. Spherical lenslets become thin lenses.
-        Positions of a turned or sheared array are straightened, directions are not.
+        Lenses (K, L) of (U, V) pixels. Its camera is the picture's, with `packed` pixels of a straight array. Three
+        things are lost: lens centres move to the centres of their rectangles, by less than a pixel along each axis
+        (more at the edge of the sensor); odd rows of a hexagonal array lie half a pitch too far left; positions of a
+        turned or sheared array are straightened, directions are not.
     owned : ndarray of bool, (L·V, K·U)
         False for pixels of neighbouring lenses, and for pixels beyond the sensor, which are black.
 
@@ -77,10 +73,10 @@ def smallest_rectangle(picture: IIPicture) -> tuple[IIPicture, Mask]:
     (k, l), source = camera.lenses, np.ascontiguousarray(picture.pixels)
     pixels, owned = np.zeros((l, v, k, u, 3), source.dtype), np.zeros((l, v, k, u), np.bool_)
     over_rows(lambda first, last: cut_rectangles(source, owner, left, top, first, last, pixels, owned), l)
-    regular = IIPicture(
-        pixels.reshape(l * v, k * u, 3), (k, l), (u, v), _regular_camera(camera, (u, v), shrink=True), picture.erect
+    made = _regular_camera(camera, (u, v), camera.pixel_pitch_mm)
+    return IIPicture(pixels.reshape(l * v, k * u, 3), (k, l), (u, v), made, picture.erect), owned.reshape(
+        l * v, k * u
     )
-    return regular, owned.reshape(l * v, k * u)
 
 
 @checks.checked(picture=checks.instance(IIPicture), camera=checks.instance(IICamera))
@@ -128,17 +124,18 @@ def from_smallest_rectangle(picture: IIPicture, camera: IICamera) -> tuple[IIPic
 def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: bool = False) -> tuple[IIPicture, Mask]:
     """Return a regular picture with every lens's cell resampled on a grid of U×V points centred on the lens.
 
-    The grid spans one pitch across and down. It is turned and sheared as the array is, so that the regular picture's
-    frame is the array's own. Interpolation is bilinear over those of the four surrounding pixels that
-    the lens owns. Its error is of second order if the lens owns all four, and of first order along the border of the
-    cell. Pixels of neighbouring lenses have no influence.
+    The grid spans one pitch across and, within a point, one down. It is turned and sheared as the array is, so that
+    the regular picture's frame is the array's own. Interpolation is bilinear over those of the four surrounding
+    pixels that the lens owns. Its error is of second order if the lens owns all four, and of first order along the
+    border of the cell. Pixels of neighbouring lenses have no influence.
 
     Parameters
     ----------
     picture : IIPicture
         With its camera; a regular picture needs none.
     ei_pixels : (U, V), optional
-        The lens pitch in pixels, rounded, if not given. A regular picture of this size is returned unchanged.
+        If not given, points are as far apart down as across: the lens pitch is rounded across to U pixels, and down
+        to steps of p/U, where p is the pitch across. A regular picture of this size is returned unchanged.
     deshift : bool
         Remove the zigzag of half a lens that the shifted odd rows of a hexagonal array give view images. Each lens of
         an odd row becomes the mean of itself and its left neighbour, direction by direction. These rows lose detail
@@ -147,9 +144,9 @@ def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: boo
     Returns
     -------
     picture : IIPicture
-        Its camera keeps lens pitch and gap. The pixel pitch becomes δP·p/U, where p is the lens pitch across in
-        pixels. If p_x/U and p_y/V differ, the scene is stretched vertically by V·p_x/(U·p_y), since pixels are
-        square; depth does not change.
+        Its camera keeps lens pitch and gap. The pixel pitch becomes δP·p/U; pixels are `packed` unless they fill the
+        pitch down, too. With ``ei_pixels`` given, the grid spans the pitch down exactly, and the scene is stretched
+        vertically by V·p_x/(U·p_y), since pixels are square; depth does not change.
     valid : ndarray of bool, (L·V, K·U)
         False for points beyond the sensor, outside the lens's cell (the corners of the grid lie outside a hexagonal
         cell), without an owned pixel around them, or for which ``deshift`` lacks one of the two lenses. Such points
@@ -162,13 +159,14 @@ def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: boo
     """
     lattice = _lattice(picture)
     u, v = whole_pair("ei_pixels", ei_pixels) if ei_pixels is not None else _nearest_whole(lattice.pitch)
+    step = lattice.pitch[0] / u
+    down = step if ei_pixels is None else lattice.pitch[1] / v
     if picture.regular and (u, v) == picture.ei_pixels:
         return picture, np.ones(picture.pixels.shape[:2], np.bool_)
     (k, l), source = picture.lenses, np.ascontiguousarray(picture.pixels)
     if k * u * l * v > MOST_PIXELS:
         raise ValueError(f"ei_pixels is {u}×{v}, a picture of {k * u}×{l * v} pixels: at most {MOST_PIXELS} are made")
-    dx = (np.arange(u) - (u - 1) / 2) * (lattice.pitch[0] / u)
-    dy = (np.arange(v) - (v - 1) / 2) * (lattice.pitch[1] / v)
+    dx, dy = (np.arange(u) - (u - 1) / 2) * step, (np.arange(v) - (v - 1) / 2) * down
     inside = _in_cell(lattice, dx, dy)
     # copies of one layout: the kernel is compiled for each
     dx, dy = (np.broadcast_to(a, (v, u)).copy() for a in lattice.offsets(dx[None, :], dy[:, None]))
@@ -180,7 +178,9 @@ def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: boo
     over_rows(lambda a, b: resample_cells(source, owner, grid, whole, a, b, pixels, valid), l)
     if deshift and lattice.hexagonal:
         average_odd_rows(pixels, valid, whole)
-    camera = _regular_camera(picture.camera, (u, v), shrink=False) if picture.camera is not None else None
+    camera = picture.camera and _regular_camera(picture.camera, (u, v), picture.camera.pixel_pitch_mm * step)
+    if camera and ei_pixels is not None:
+        camera = replace(camera, lens_pitch_mm=None, packed=False)  # type: ignore[arg-type]
     regular = IIPicture(pixels.reshape(l * v, k * u, 3), (k, l), (u, v), camera, picture.erect)
     return regular, valid.reshape(l * v, k * u)
 
@@ -217,8 +217,8 @@ def _lattice(picture: IIPicture) -> Lattice:
 
 
 def _nearest_whole(pitch: tuple[float, float]) -> Pair:
-    across, down = (max(1, int(p + 0.5)) for p in pitch)
-    return across, down
+    across = max(1, int(pitch[0] + 0.5))
+    return across, max(1, int(pitch[1] * across / pitch[0] + 0.5))
 
 
 def _rectangles(lattice: Lattice, owner: Ints) -> tuple[Ints, Ints, Pair]:
@@ -250,44 +250,22 @@ def _in_cell(lattice: Lattice, dx: NDArray[Any], dy: NDArray[Any]) -> Mask:
     return abs(dx)[None, :] * p + 2 * abs(dy)[:, None] * q <= p * p / 4 + q * q
 
 
-def _regular_camera(camera: IICamera, ei_pixels: Pair, *, shrink: bool) -> IICamera:
-    """Return the camera of the regular picture; ``shrink`` scales the gap with the pixels to keep directions."""
+def _regular_camera(camera: IICamera, ei_pixels: Pair, pixel_mm: float) -> IICamera:
+    """Return the camera of a picture of elementary images of this size and pitch of pixels, side by side."""
     (u, v), (k, l) = ei_pixels, camera.lenses
-    if shrink and camera.viewer_mm is not None:
-        raise ValueError(f"viewer_mm is {camera.viewer_mm:g}: a camera whose viewing zones meet is to be resampled")
-    ratio = camera.lens_lattice.pitch[0] / u
-    gap = camera.gap_mm * ratio if shrink else camera.gap_mm
-    forward = camera.gap_mm - gap  # keeps the lens plane in place
-    shift = (*camera.lens_offset_mm, forward)
-    origin = tuple(a + b for a, b in zip(camera.origin_mm, shift, strict=True))
-    return IICamera(
-        name=camera.name,
+    x, y = camera.lens_offset_mm
+    made = replace(
+        camera,
         pixels=(k * u, l * v),
-        lenses=(k, l),
-        pixel_pitch_mm=camera.pixel_pitch_mm * ratio,
-        gap_mm=gap,
-        origin_mm=origin,  # type: ignore[arg-type]
-        start_mm=camera.start_mm,
-        viewer_mm=camera.viewer_mm,
-        both_sides=camera.both_sides,
-        optics=(_same_focus(camera, gap), *(element.moved(-forward) for element in camera.front)),
+        pixel_pitch_mm=pixel_mm,
+        lattice="rectangular",
+        lens_offset_mm=(0.0, 0.0),
+        lens_turn_deg=0.0,
+        lens_shear=0.0,
+        lens_drift_mm=None,
+        origin_mm=(camera.origin_mm[0] + x, camera.origin_mm[1] + y, camera.origin_mm[2]),
     )
-
-
-def _same_focus(camera: IICamera, gap: float) -> LensModel:
-    """Return a lens model that images the same plane with another gap."""
-    model = camera.lens_model
-    if isinstance(model, SphericalLenslet) and model.ior == 1:  # no refraction
-        return Pinhole()
-    if isinstance(model, SphericalLenslet):  # the sphere may be too small for the stretched cell
-        model = Lenslet(focal_mm=model.radius_mm / (model.ior - 1), aperture_mm=model.aperture_mm)
-    if not isinstance(model, Lenslet) or gap == camera.gap_mm:
-        return model
-    power = 1 / np.atleast_2d(np.asarray(model.focal_mm, np.float64)) + (1 / gap - 1 / camera.gap_mm)
-    if not (power > 0).all():  # a diverging lens
-        return Pinhole()
-    rows = tuple(tuple(float(f) for f in row) for row in 1 / power)
-    return replace(model, focal_mm=rows if isinstance(model.focal_mm, tuple) else rows[0][0])
+    return made if made.regular and made.ei_pixels == ei_pixels else replace(made, packed=True)
 
 
 @kernel
