@@ -26,7 +26,7 @@ def quilt_views(path: Path, grid: Pair | None) -> Views:
     match = QUILT.search(path.stem)
     if match is None and grid is None:
         if not path.exists():
-            raise FileNotFoundError(f"{path} does not exist: a folder of views, or a quilt with its grid, is needed")
+            raise ValueError(f"{path} does not exist: a folder of views, or a quilt with its grid, is needed")
         raise ValueError(
             f"{path} is no folder and its name says no _qsCxRaA: a quilt needs its grid of tiles, a lenslet picture "
             "its white picture or the pixels under a lens"
