@@ -36,6 +36,7 @@ from .elements import Bundle, Element, FrontElement, LensModel, Under
 from .lattice import DRIFT_TERMS, LATTICES, STEEPEST, Drift, Lattice, axes_of
 from .optics import Pinhole, chain, unit_disk
 
+ASSUMED = "nominal"  # name of a camera that was assumed, also in files
 LEAST_PITCH = 1e-6  # pixels from lens to lens: shorter ones are rounded to nothing
 MOST_TURN, MOST_SHEAR = 60.0, 0.25  # degrees; beyond, rows and columns should change their names
 MOST_ALONG, MOST_PIXELS = 1 << 20, 1 << 34  # of a camera; a hundred times the largest picture in use
@@ -523,9 +524,13 @@ class IICamera:
         if not isinstance(parameters.get("optics", ()), Sequence) or isinstance(parameters.get("optics"), str):
             raise ValueError(f"camera: optics are {parameters['optics']!r}: a list of elements is needed")
         try:
-            return cls(**{**parameters, "name": str(parameters.get("name", ""))})
+            made = cls(**{**parameters, "name": str(parameters.get("name", ""))})
         except TypeError as error:
             raise ValueError(f"camera has a value of the wrong type: {error}") from None
+        if made.name == ASSUMED and made.regular and "lens_pitch_mm" not in data:  # until 29 November 2026
+            pitch = made.lens_pitch_mm[0]
+            return replace(made, lens_pitch_mm=(pitch, pitch), packed=made.ei_pixels[0] != made.ei_pixels[1])
+        return made
 
 
 def _started(rays: Bundle, z_mm: float) -> Bundle:

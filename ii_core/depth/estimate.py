@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from ..base import checks
 from ..base.extras import Lazy
 from ..base.parallel import over_rows
-from ..camera.camera import IICamera, Pair
-from ..picture.assumed import ASSUMED
+from ..camera.camera import ASSUMED, IICamera, Pair
 from ..picture.disparity import depth_of_disparity, disparity_of_depth
 from ..picture.picture import IIPicture
 from . import disparity_kernels as kernels

@@ -6,10 +6,9 @@ import math
 from dataclasses import replace
 
 from ..base.checks import checked, instance, length, number
-from ..camera.camera import IICamera
+from ..camera.camera import ASSUMED, IICamera
 from .picture import IIPicture
 
-ASSUMED = "nominal"  # name of such a camera, also in files
 ASSUMED_ANGLE_DEG = 20.0
 
 

@@ -19,6 +19,7 @@ from ii_core import (
     refocus,
     sub_images,
     view_image,
+    with_assumed_camera,
     write_hci,
 )
 from ii_core.depth.layers import disparity_layers
@@ -158,6 +159,16 @@ def test_parameters_of_the_benchmark_are_read(tmp_path):
     (tmp_path / "parameters.cfg").write_text((tmp_path / "parameters.cfg").read_text().replace("60.0", "-1"))
     with pytest.raises(ValueError, match=r"parameters\.cfg: baseline_mm is -1"):
         find_views(tmp_path)
+
+
+def test_assumed_cameras_of_older_files_have_square_view_pixels():
+    older = {"name": "nominal", "pixels": [36, 6], "lenses": [4, 6], "pixel_pitch_mm": 1.0, "gap_mm": 25.5}
+    read = IICamera.from_json(older)
+    assert read.packed and read.lens_pitch_mm == (9, 9)
+    assert not IICamera.from_json(older | {"pixels": [36, 54]}).packed
+    assert not IICamera.from_json(older | {"name": "panel"}).packed
+    bare = with_assumed_camera(IIPicture(np.zeros((6, 36, 3), np.uint8), (4, 6), (9, 1))).camera
+    assert IICamera.from_json(bare.to_json()) == bare
 
 
 def test_invalid_lengths_and_grids_are_refused():
