@@ -114,7 +114,8 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         by (s − 1)Λ: ``origin_mm`` is negative. All planes and the field of view stay.
 
     Start of rays, meeting of viewing zones
-        Their positions in the scene do not change.
+        Their positions in the scene do not change. Of an array of cameras, whose rays start there, nor does the lens
+        plane; pixels are then `packed`.
 
     Apertures grow with the lens pitch, so the blur of planes out of focus, in pixels of a view, does not change. The
     field of view of a main lens grows by a/(a − d).
@@ -143,9 +144,12 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         return replace(camera, pixels=pixels, pixel_pitch_mm=pitch)
     nearer = camera.gap_mm * (scale - 1)
     # The depth of a sensor in a stack grows with the gap; the position of a camera in an array does not.
-    forward = -nearer if surfaces_of(camera.front) else camera.origin_mm[2] * (scale - 1)
-    viewer = None if camera.viewer_mm is None else camera.viewer_mm + nearer
-    start = camera.start_mm + nearer if camera.start_mm else 0.0
+    array = camera.viewer_mm is not None and camera.start_mm == camera.viewer_mm  # of cameras: the plane stays
+    kept = array or surfaces_of(camera.front)
+    forward = -nearer if kept else camera.origin_mm[2] * (scale - 1)
+    viewer = None if camera.viewer_mm is None else camera.viewer_mm + nearer + forward
+    start = camera.start_mm + nearer + forward if camera.start_mm else 0.0
+    packed = camera.packed or array
     scaling = Scaling(
         factor=scale,
         gap_mm=camera.gap_mm,
@@ -163,9 +167,10 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         lenses=(camera.lenses[0] // scale, camera.lenses[1] // scale),
         pixel_pitch_mm=pitch,
         gap_mm=camera.gap_mm * scale,
-        lens_pitch_mm=_times(camera.lens_pitch_mm, scale) if viewer is None or camera.packed else None,  # type: ignore[arg-type]
+        lens_pitch_mm=_times(camera.lens_pitch_mm, scale) if viewer is None or packed else None,  # type: ignore[arg-type]
         start_mm=start,
         viewer_mm=viewer,
+        packed=packed,
         lens_offset_mm=_times(camera.lens_offset_mm, scale),
         lens_drift_mm=camera.lens_drift_mm and tuple(_times(factors, scale) for factors in camera.lens_drift_mm),
         origin_mm=(*camera.origin_mm[:2], camera.origin_mm[2] + forward),

@@ -22,6 +22,7 @@ from ii_core import (
     with_assumed_camera,
     write_hci,
 )
+from ii_core.camera.presets import scaled
 from ii_core.depth.layers import disparity_layers
 from ii_core.formats.hci import view_disparity
 from ii_core.formats.rig import rig_of
@@ -72,6 +73,18 @@ def test_disparity_has_both_signs_and_the_closed_form(z):
     assert disparity_of_depth(CAMERA, z) == pytest.approx(expected, rel=1e-9, abs=1e-9)
     assert depth_of_disparity(CAMERA, expected) == pytest.approx(z)
     assert (expected > 0) == (z < 900) or abs(z - 900) < 1e-6
+
+
+@pytest.mark.parametrize("views", [(5, 5), (9, 1)], ids=str)
+def test_fewer_lenses_are_larger_pixels_of_the_same_cameras(views):
+    fewer, wanted = scaled(RIG.camera(views, (64, 48)), 4), RIG.camera(views, (16, 12))
+    for z in (0.0, 900.0, 2000.0):
+        places = []
+        for camera in (fewer, wanted):
+            L, D = camera.rays()
+            places.append(L + (z - L[..., 2:]) / D[..., 2:] * D)
+        np.testing.assert_allclose(*places, atol=1e-9 * 2000)
+    np.testing.assert_allclose(*(disparity_of_depth(camera, [500, 5000]) for camera in (fewer, wanted)))
 
 
 @pytest.mark.parametrize("views", [(9, 1), (1, 7), (3, 5)], ids=str)
