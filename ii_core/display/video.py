@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.files import one_line
 from ..camera.camera import Pair
 from ..formats.grid import camera_views
-from ..formats.quilt import QUILT, quilt_name
+from ..formats.quilt import QUILT, aspect_of, quilt_name
 from ..picture.assumed import with_assumed_camera
 from ..picture.picture import IIPicture, codes8
 from ..video.video import IIVideo
@@ -120,6 +120,8 @@ def write_path_film(
 def open_quilt_video(path: str | os.PathLike[str], *, grid: Pair | None = None) -> IIVideo:
     """Open a quilt video as II-video: a lens for each pixel of a tile, and the views as one row of pixels under it.
 
+    The camera is assumed, with the aspect of the name; without one there is none.
+
     Frames are decoded in order; reading a frame before the latest one restarts at the first.
 
     Parameters
@@ -183,7 +185,8 @@ class _QuiltFilm:
             raise ValueError(f"{self.path} of {width}×{height} px cannot hold {cols}×{rows} tiles")
         tiles = quilt[: rows * h, : cols * w].reshape(rows, h, cols, w, 3)[::-1]
         views = tiles.transpose(1, 3, 0, 2, 4).reshape(h, w * cols * rows, 3)
-        return IIPicture(np.ascontiguousarray(views), (w, h), (cols * rows, 1))
+        picture, aspect = IIPicture(np.ascontiguousarray(views), (w, h), (cols * rows, 1)), aspect_of(self.path.stem)
+        return picture if aspect is None else with_assumed_camera(picture, aspect=aspect)
 
 
 def eight_bit(picture: IIPicture) -> IIPicture:

@@ -21,6 +21,12 @@ from .grid import WHOLE_ORDER, Views, camera_views, read_view
 QUILT = re.compile(r"_qs(\d+)x(\d+)(?:a(\d+(?:\.\d+)?))?")
 
 
+def aspect_of(name: str) -> float | None:
+    """Return the aspect of the display in the name of a quilt; None without one."""
+    match = QUILT.search(name)
+    return float(match[3]) or None if match and match[3] else None
+
+
 def quilt_views(path: Path, grid: Pair | None) -> Views:
     """Return the views of a quilt; ``grid`` is (columns, rows) of tiles, by default that of the name."""
     match = QUILT.search(path.stem)
@@ -45,8 +51,7 @@ def quilt_views(path: Path, grid: Pair | None) -> Views:
         top = height - (up + 1) * tile_height
         return pixels[top : top + tile_height, right * tile_width : (right + 1) * tile_width]
 
-    aspect = float(match[3]) if match and match[3] and float(match[3]) else None
-    return Views(shape=(1, rows * cols), read=tile, known=WHOLE_ORDER, aspect=aspect)
+    return Views(shape=(1, rows * cols), read=tile, known=WHOLE_ORDER, aspect=aspect_of(path.stem))
 
 
 def quilt_pixels(views: Iterable[NDArray[Any]], tiles: Pair) -> NDArray[Any]:

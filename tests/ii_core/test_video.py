@@ -135,6 +135,9 @@ def test_a_quilt_video_has_its_name_its_rate_and_its_views(tmp_path):
         for u in (0, 3, 7):
             view = back.component(frame, "si", (u, 0)).astype(int)
             assert np.abs(view - views[:, u]).mean() < 4, (frame, u)  # a frame is 20 from the next
+    path = path.rename(tmp_path / "take_qs4x2a1.6.mp4")
+    across, down = open_quilt_video(path)[1].camera.lens_pitch_mm
+    assert (32 * across) / (16 * down) == pytest.approx(1.6)
     with pytest.raises(ValueError, match="grid of tiles"):
         open_quilt_video(path.rename(tmp_path / "plain.mp4"))
     (tmp_path / "no_qs2x2a1.mp4").write_bytes(b"no video")
