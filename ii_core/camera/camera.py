@@ -112,8 +112,8 @@ class IICamera:
         The array sees the image of a main lens that is not in ``optics``, on both sides of the lens plane; z is that
         of the image. Rays do not depend on it.
     packed : bool
-        Elementary images of M/K × N/L pixels lie side by side in the picture. Before the lenses each stands in the
-        middle of its place, whose pitch may be another: with 9×1 pixels under square lenses, for a row of cameras.
+        Elementary images of M/K × N/L pixels lie side by side in the picture, but each stands under the middle of its
+        lens, whatever the lens pitch: those of a row of cameras are 9×1 pixels under square lenses.
     name : str
         Name in files and messages.
 
@@ -527,7 +527,7 @@ class IICamera:
             made = cls(**{**parameters, "name": str(parameters.get("name", ""))})
         except TypeError as error:
             raise ValueError(f"camera has a value of the wrong type: {error}") from None
-        if made.name == ASSUMED and made.regular and "lens_pitch_mm" not in data:  # until 29 November 2026
+        if made.name == ASSUMED and made.regular and "lens_pitch_mm" not in data:  # before pixels could be packed
             pitch = made.lens_pitch_mm[0]
             return replace(made, lens_pitch_mm=(pitch, pitch), packed=made.ei_pixels[0] != made.ei_pixels[1])
         return made

@@ -14,7 +14,7 @@ from ..base.colour import linear, srgb
 from ..camera.camera import IICamera
 from ..camera.optics import Lenslet, unit_disk
 from ..picture.picture import IIPicture
-from ..picture.view import lens_array_mm
+from ..picture.view import lens_array_mm, pixels_aside
 from .eye_kernel import Emitters, Gaze, Lenses, Panel, Refraction, see
 from .model import LAYOUTS, DisplayModel
 
@@ -151,10 +151,11 @@ def eye_image(
 
 def _distance(camera: IICamera, eye: Eye) -> float:
     """Return the distance of the eye from the lens plane."""
-    z = eye.position_mm[2] - camera.origin_mm[2]
-    distance = camera.gap_mm - z
+    z, base = eye.position_mm[2], camera.origin_mm[2]
+    distance = camera.gap_mm - (z - base)
     if not distance > 0:
-        raise ValueError(f"eye is at z {z:g} mm, not before the lens plane at {camera.gap_mm:g} mm: z < 0 is needed")
+        plane = base + camera.gap_mm
+        raise ValueError(f"eye is at z {z:g} mm, not before the lens plane at {plane:g} mm: z < {plane:g} is needed")
     return distance
 
 
@@ -178,12 +179,9 @@ def _lenses(display: DisplayModel, half: NDArray[np.float64]) -> Lenses:
 def _panel(camera: IICamera, sign: float) -> Panel:
     """Return the panel of a camera's pixels; ``sign`` is −1 for erect elementary images."""
     (pitch_x, pitch_y), (width, height), (u, v) = camera.lens_pitch_mm, lens_array_mm(camera), camera.ei_pixels
-    aside = 0.0
-    if camera.viewer_mm is not None:
-        aside = sign * camera.gap_mm / (camera.viewer_mm * camera.pixel_pitch_mm)
     return Panel(
         pitch_x=float(pitch_x), pitch_y=float(pitch_y), half_x=width / 2, half_y=height / 2,
-        aside=aside, pixel=float(camera.pixel_pitch_mm), u=u, v=v,
+        aside=pixels_aside(camera, sign), pixel=float(camera.pixel_pitch_mm), u=u, v=v,
     )  # fmt: skip
 
 

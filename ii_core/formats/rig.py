@@ -4,8 +4,8 @@ U×V cameras stand B apart in a plane and look the same way. Each has its pictur
 of the plane at distance Z₀, the plane of zero disparity. That plane is the lens plane of an II-camera. Its lenses are
 the pixels of the views, δL = Z₀·s/f apart (s pixel pitch, f focal length of a camera). The viewing zones of all meet
 in the plane of the cameras, Z₀ before it. Rays start there (``start_mm``), and the scene stands on both sides. Pixel
-pitch and gap follow from Λ = δP·Z₀/B and the pitch U·δP = δL·(1 − Λ/Z₀) of elementary images. In a row, or if U ≠ V,
-the larger of both fills the pitch, and elementary images are packed.
+pitch and gap follow from Λ = δP·Z₀/B and the pitch U·δP = δL·(1 − Λ/Z₀) of elementary images. If U ≠ V, the
+larger of both fills the pitch, and elementary images are packed.
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ def view_positions(
     plane = camera.origin_mm[2] + camera.gap_mm
     if not e[2] < plane:
         raise ValueError(
-            f"viewpoint z {e[2]:g} mm is not before the lens plane at {plane:g} mm: a viewer stands at z < 0"
+            f"viewpoint z {e[2]:g} mm is not before the lens plane at {plane:g} mm: z < {plane:g} is needed"
         )
     e = e - camera.origin_mm
     (k, l), (u, v) = camera.lenses, camera.ei_pixels
@@ -98,10 +98,16 @@ def view_positions(
     to_pixels = sign * camera.gap_mm / ((camera.gap_mm - e[2]) * camera.pixel_pitch_mm)
     x = np.arange(k) * u + (u - 1) / 2 - (lens_x - e[0]) * to_pixels
     y = np.arange(l) * v + (v - 1) / 2 + (lens_y - e[1]) * to_pixels * down
-    if camera.viewer_mm is not None:  # elementary images stand beside their lenses
-        aside = sign * camera.gap_mm / (camera.viewer_mm * camera.pixel_pitch_mm)
-        x, y = x + lens_x * aside, y - lens_y * aside * down
-    return x, y
+    aside = pixels_aside(camera, sign)
+    return x + lens_x * aside, y - lens_y * aside * down
+
+
+def pixels_aside(camera: IICamera, sign: float) -> float:
+    """Return how far elementary images stand beside their lenses, if zones meet: pixels by mm of a lens's place.
+
+    ``sign`` is −1 for erect elementary images.
+    """
+    return 0.0 if camera.viewer_mm is None else sign * camera.gap_mm / (camera.viewer_mm * camera.pixel_pitch_mm)
 
 
 def lens_array_mm(camera: IICamera) -> tuple[float, float]:

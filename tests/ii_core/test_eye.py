@@ -335,6 +335,8 @@ def test_invalid_eyes_are_refused(change, said):
 
 def test_invalid_views_of_an_eye_are_refused():
     made = camera()
+    with pytest.raises(ValueError, match="eye is at z 500 mm, not before the lens plane at 120 mm"):
+        eye_image(noise(MEETING["row"]), DisplayModel(camera=MEETING["row"]), Eye(position_mm=(0.0, 0.0, 500.0)))
     with pytest.raises(ValueError, match="not before the lens plane"):
         eye_image(noise(made), DisplayModel(camera=made), Eye(position_mm=(0.0, 0.0, 0.2)))
     with pytest.raises(ValueError, match="the same structure"):
