@@ -125,10 +125,8 @@ def report(camera: IICamera) -> str:
     if camera.start_mm:
         lines.append(f"rays start         {camera.start_mm:.4g} mm behind the lenses: a virtual display plane")
     if camera.viewer_mm is not None:
-        pitch = _pair(list(camera.ei_pitch_mm))
-        lines.append(
-            f"zones meet         {camera.viewer_mm:.4g} mm before the lenses, one elementary image every {pitch} mm"
-        )
+        image = f"elementary images of {_pair(list(camera.ei_pitch_mm))} mm"
+        lines.append(f"zones meet         {camera.viewer_mm:.4g} mm before the lenses, {image}")
     lines += _cell_lines(camera, p)
     sizes = ", ".join(f"{name} {size / 1e6:.4g} MB" for name, size in p["map_bytes"].items())
     lines += [f"L and D maps       {sizes}, unpacked", ""]
