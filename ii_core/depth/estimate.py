@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from ..base import checks
 from ..base.extras import Lazy
 from ..base.parallel import over_rows
-from ..camera.camera import ASSUMED, IICamera, Pair
-from ..picture.disparity import depth_of_disparity, disparity_of_depth
+from ..camera.camera import IICamera, Pair
+from ..picture.disparity import depth_of_disparity
 from ..picture.picture import IIPicture
 from . import disparity_kernels as kernels
 from .around import CODES, DIRECTIONS, halved, views_around
 from .disparity_kernels import Views
 from .focus_kernels import choose, pass_on
 from .highlights import highlights
-from .layers import FARTHEST, first_mm
+from .layers import possible
 
 ndimage = Lazy("scipy.ndimage")
 Map = NDArray[np.float32]
@@ -37,8 +37,6 @@ MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of c
 # The range of disparities: at most WIDEST of the longer side of a view; found in views of at most SEARCH_SIDE px, at
 # MANY pixels whose costs within NOISE 8-bit codes of the least span less than VALLEY px.
 WIDEST, SEARCH_SIDE, MANY, NOISE, VALLEY = 0.75, 128, 16, 4.0, 2.0
-# Nearest depth, as a share of the way from the cameras to where their views agree, which may be as good as infinite.
-NEAREST = 1e-9
 # Gauss–Newton: differences of occluded views, 8-bit codes; window of planes, px; likeness in codes and disparity;
 # weight of the old disparity, codes² a px²; weight of level planes over that of the data; longest step, px.
 STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 6, 6.0, 5, 20.0, 0.1, 1000.0, 0.2, 0.3
@@ -285,22 +283,6 @@ def search_range(views: Views, camera: IICamera | None, workers: int | None) -> 
 def widest(views: Views) -> float:
     """Return the largest disparity that is looked for, px a step."""
     return float(max(views.pixels.shape[2:]) * WIDEST)
-
-
-def possible(camera: IICamera | None, most: float) -> tuple[float, float]:
-    """Return the disparities of depths before the camera, at most ``most`` px in size."""
-    if camera is None or camera.name == ASSUMED or camera.both_sides:
-        return -most, most
-    if camera.front:
-        return max(-most, float(disparity_of_depth(camera, np.inf))), most
-    base = camera.origin_mm[2] + camera.gap_mm
-    if camera.viewer_mm is None:
-        return -most, 0.0
-    infinity = float(disparity_of_depth(camera, base + FARTHEST * camera.viewer_mm))
-    near = first_mm(camera)
-    with np.errstate(divide="ignore"):
-        nearest = float(disparity_of_depth(camera, near + NEAREST * (base - near))) if near < base else most
-    return max(-most, infinity), min(most, nearest)
 
 
 def costs(views: Views, labels: Map, workers: int | None) -> Costs:

@@ -248,7 +248,8 @@ def _robust(picture: IIPicture, layers: Floats, h: Floats, nearest: bool, worker
         pixels, shift = picture.pixels, pixels_per_lens(camera, layers)
         across, down = whole_pixel_steps(shift * u, u), whole_pixel_steps(shift * v, v)
         cols, rows = pixel_tables(camera, layers, across, down, erect=picture.erect, nearest=nearest, snap=True)
-        place = np.log(np.maximum(layers - camera.origin_mm[2] - camera.gap_mm, camera.gap_mm / 1e9))
+        start = camera.origin_mm[2] + camera.gap_mm - camera.start_mm
+        place = np.log(np.maximum(layers - start, camera.gap_mm / 1e9))
     else:
         pixels, place = views_side_by_side(picture), place_of(camera, layers)
         across, down = view_steps(u, RINGS), view_steps(v, RINGS)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import checks
-from ..camera.camera import IICamera
+from ..camera.camera import ASSUMED, IICamera
 from ..picture.disparity import depth_of_disparity, disparity_of_depth
 from ..picture.picture import IIPicture
 from ..picture.view import camera_of, view_positions
@@ -70,8 +70,7 @@ def covering_layers(camera: IICamera, depth_mm: ArrayLike | None = None, count: 
     -------
     ndarray of float64, (count,) or (1,)
     """
-    start = camera.gap_mm - camera.start_mm if camera.start_mm else 0.0
-    base = camera.origin_mm[2] + start
+    base = first_mm(camera)
     z = np.asarray([] if depth_mm is None else depth_mm, np.float64) - base
     z = z[np.isfinite(z) & (z > 0)]
     near, far = (z.min(), z.max()) if z.size else (3 * camera.gap_mm, (camera.pixels[0] + 1) * camera.gap_mm)
@@ -108,8 +107,8 @@ def disparity_layers(camera: IICamera, low: float, high: float, count: int = LAY
 def field_layers(camera: IICamera, count: int = LAYERS) -> Floats:
     """Return layers of equal steps in disparity, of both signs, for views whose viewing zones meet, mm.
 
-    A point of the nearest layer moves by `FIELD_SPAN` pixels from the middle view to the outermost. The farthest
-    layer has the opposite disparity, or ends before infinity.
+    A point of the nearest layer moves by `FIELD_SPAN` pixels from the middle view to the outermost, and one of the
+    farthest as much the other way, unless rays start, or infinity lies, between them.
 
     Raises
     ------
@@ -118,9 +117,9 @@ def field_layers(camera: IICamera, count: int = LAYERS) -> Floats:
     """
     if camera.viewer_mm is None:
         raise ValueError("viewing zones are parallel: layers of disparity are for views that meet")
-    high = FIELD_SPAN / max((max(camera.ei_pixels) - 1) // 2, 1)
+    span = FIELD_SPAN / max((max(camera.ei_pixels) - 1) // 2, 1)
     infinity = float(disparity_of_depth(camera, FARTHEST * (camera.viewer_mm + camera.gap_mm) + camera.origin_mm[2]))
-    return disparity_layers(camera, max(-high, infinity), high, count)
+    return disparity_layers(camera, max(-span, infinity), possible(camera, span)[1], count)
 
 
 def logarithmic(layers_mm: Floats) -> bool:
@@ -130,8 +129,20 @@ def logarithmic(layers_mm: Floats) -> bool:
 
 
 def first_mm(camera: IICamera) -> float:
-    """Return the z before which no layer lies: that of the cameras of converged views, else 0."""
-    return camera.origin_mm[2] + camera.gap_mm - camera.start_mm if camera.start_mm else 0.0
+    """Return the z before which no layer lies: where rays start, or the pixel array if that is at the lenses."""
+    return camera.origin_mm[2] + (camera.gap_mm - camera.start_mm if camera.start_mm else 0.0)
+
+
+def possible(camera: IICamera | None, most: float) -> tuple[float, float]:
+    """Return the disparities of depths before the camera, at most ``most`` px in size."""
+    if camera is None or camera.name == ASSUMED or camera.both_sides:
+        return -most, most
+    if camera.front:
+        return max(-most, float(disparity_of_depth(camera, np.inf))), most
+    plane, start, meeting = camera.origin_mm[2] + camera.gap_mm, camera.start_mm, camera.viewer_mm or math.inf
+    infinity = -most if meeting == math.inf else float(disparity_of_depth(camera, plane + FARTHEST * meeting))
+    nearest = most if start >= meeting else float(disparity_of_depth(camera, plane - (1 - ALIKE) * start)) + 0.0
+    return max(-most, infinity), min(most, nearest)
 
 
 def check_layers(layers_mm: ArrayLike | None, camera: IICamera, depth_mm: ArrayLike | None = None) -> Floats:

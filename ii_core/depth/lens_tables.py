@@ -37,7 +37,7 @@ def whole_pixel_steps(shift: Floats, ei: int) -> NDArray[np.int64]:
     """
     half = max((ei - 1) // 2, min(ei - 1, 1))
     pixels = np.unique(np.rint(np.linspace(1, half, RINGS))) if half else np.empty(0)
-    steps = np.maximum(np.rint(pixels / shift[:, None]), 1).astype(np.int64)
+    steps = np.maximum(np.rint(pixels / np.abs(shift[:, None])), 1).astype(np.int64)
     again = np.zeros(steps.shape, bool)
     again[:, 1:] = steps[:, 1:] == steps[:, :-1]
     steps[again] = NOWHERE
@@ -99,11 +99,13 @@ def pixel_tables(
 
 
 def pixels_per_lens(camera: IICamera, layers_mm: Floats) -> Floats:
-    """Return the shift of a point of each layer from lens to lens, in sides of the elementary image: Λ/z'."""
+    """Return the shift of a point of each layer from lens to lens, in sides of the elementary image: Λ/z'.
+
+    Where rays start at the lenses nothing is in focus before them: infinitely far off through all but the own lens.
+    """
     beyond = np.asarray(layers_mm) - camera.origin_mm[2] - camera.gap_mm
     with np.errstate(divide="ignore"):
-        # At the lens plane and before it nothing is in focus: infinitely far off through all but the own lens.
-        return np.where(beyond > 0, camera.gap_mm / beyond, np.inf)
+        return np.where((beyond > 0) | (camera.start_mm > 0), camera.gap_mm / beyond, np.inf)
 
 
 def _table(position: Floats, ei: int, per_step: Floats, steps: NDArray[Any], nearest: bool) -> Table:

@@ -94,6 +94,13 @@ def test_disparity_of_a_slanted_plane(form):
     assert found.disparity.shape == found.confidence.shape == truth.shape
 
 
+def wall_light(camera, z):
+    """Light of a textured wall along the rays of a camera."""
+    start, way = camera.rays()
+    place = start + (z - start[..., 2:]) / way[..., 2:] * way
+    return texture(place[..., 0] / camera.lens_pitch_mm[0], place[..., 1] / camera.lens_pitch_mm[1])
+
+
 @pytest.mark.parametrize("ei", [(7, 5), (5, 7)], ids=str)
 @pytest.mark.parametrize("meeting", [{}, {"viewer_mm": 60.0, "start_mm": 60.0}], ids=["parallel", "meeting"])
 def test_lenses_closer_down_than_across_or_farther(ei, meeting):
@@ -102,13 +109,7 @@ def test_lenses_closer_down_than_across_or_farther(ei, meeting):
         pixels=(48 * ei[0], 40 * ei[1]), lenses=(48, 40), pixel_pitch_mm=0.1, gap_mm=2.0, **meeting,
     )  # fmt: skip
     z, (across, down) = 20.0, made.lens_pitch_mm
-
-    def wall(camera):
-        start, way = camera.rays()
-        place = start + (z - start[..., 2:]) / way[..., 2:] * way
-        return texture(place[..., 0] / across, place[..., 1] / down)
-
-    light = wall(made)
+    light = wall_light(made, z)
     picture = IIPicture(np.rint(65535 * light).astype(np.uint16), made.lenses, made.ei_pixels, made)
     truth = float(disparity_of_depth(made, z))
     assert abs(truth) > 0.5 and (across > down) == (ei[0] > ei[1])
@@ -124,7 +125,7 @@ def test_lenses_closer_down_than_across_or_farther(ei, meeting):
     assert np.abs(srgb(sharp) - own / 65535)[inner].max() < 0.02  # between pixels, by cubics
     finer = replace(made, pixels=(2 * made.pixels[0], 2 * made.pixels[1]), pixel_pitch_mm=0.05)
     other = retarget(picture, finer, np.full((ei[1], ei[0], 40, 48), truth, np.float32))
-    error = np.abs(other.picture.pixels / 65535 - wall(finer)).max(axis=2)
+    error = np.abs(other.picture.pixels / 65535 - wall_light(finer, z)).max(axis=2)
     assert (other.mask == 2).mean() > 0.8 and np.quantile(error[other.mask == 2], 0.9) < 0.01
     layers = z + np.array([-8.0, -4.0, 0.0, 4.0, 8.0])
     assert (depth_from_focus(picture, layers_mm=layers, method="robust").layer[inner] == 2).mean() > 0.95
@@ -269,6 +270,22 @@ def test_an_array_of_cameras_sees_near_things_wherever_its_views_agree(focus_mm)
     found = estimate_depth(replace(picture, camera=camera))
     assert np.median(np.abs(found.disparity - truth)) < 0.02
     assert np.median(found.depth_mm) == pytest.approx(z, rel=0.03)
+
+
+@pytest.mark.parametrize("viewer_mm", [None, 90.0])
+@pytest.mark.parametrize(("optics", "start_mm", "z"), [("pinhole", 40.0, -15.0), ("grin", 0.0, 20.0)])
+def test_depth_begins_where_rays_start(optics, start_mm, z, viewer_mm):
+    """A wall before a virtual display plane was placed behind it; panels with meeting zones had no layers at all."""
+    camera = IICamera(
+        pixels=(48 * 7, 40 * 5), lenses=(48, 40), pixel_pitch_mm=0.1, gap_mm=2.0, optics=(optics,),
+        start_mm=start_mm, viewer_mm=viewer_mm,
+    )  # fmt: skip
+    light = np.rint(65535 * wall_light(camera, z)).astype(np.uint16)
+    picture = IIPicture(light, camera.lenses, camera.ei_pixels, camera, camera.erect)
+    found, focus = estimate_depth(picture), depth_from_focus(picture, method="robust")
+    inner = (slice(6, -6), slice(6, -6))
+    assert np.median(np.abs(found.depth_mm - z)[inner]) < 0.1
+    assert np.median(np.abs(focus.depth_mm - z)[inner]) < 0.2
 
 
 @pytest.mark.parametrize("lens", [{"both_sides": True}, {"optics": [Lens(z_mm=70.0, focal_mm=50.0)]}])

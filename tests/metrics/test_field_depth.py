@@ -1,6 +1,7 @@
 """Depth from focus on converged views, disparity of both signs; confidence against noise."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -120,6 +121,8 @@ def test_default_layers_have_both_signs():
     d = disparity_of_depth(CAMERA, layers)
     assert d[0] == pytest.approx(8) and np.ptp(np.diff(d)) < 1e-9  # 16 px from the middle view to the outermost
     assert -2.033 < d[-1] < -2.0  # infinity has −B·f/(s·z₀) = −2.032 px
+    at_lenses = replace(CAMERA, start_mm=0.0)  # nothing is before the lens plane
+    assert disparity_of_depth(at_lenses, field_layers(at_lenses))[[0, -1]] == pytest.approx([0, d[-1]])
     with pytest.raises(ValueError, match="viewing zones are parallel"):
         field_layers(preset("setup1"))
     flat = IICamera(
