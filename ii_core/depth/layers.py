@@ -34,9 +34,11 @@ def linear_layers(camera: IICamera, count: int = LAYERS) -> Floats:
 def virtual_viewpoint(camera: IICamera) -> Floats:
     """Return V = (0, 0, Λ − K·Λ), in front of the middle of the array, in camera coordinates.
 
-    If viewing zones meet at a distance d, V = (0, 0, Λ − d), where every lens shows its own elementary image.
+    If viewing zones meet at a distance d, V = (0, 0, Λ − d), where every lens shows its own elementary image; before
+    `packed` ones that are narrower than their lenses V stands farther off, so that they do, too.
     """
-    distance = camera.viewer_mm or camera.gap_mm * camera.lenses[0]
+    wide = max(1.0, camera.lens_pitch_mm[0] / camera.ei_pitch_mm[0])
+    distance = camera.viewer_mm or camera.gap_mm * camera.lenses[0] * wide
     return np.array([0.0, 0.0, camera.gap_mm - distance]) + camera.origin_mm
 
 

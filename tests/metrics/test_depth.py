@@ -88,6 +88,16 @@ def test_pixels_are_those_of_the_nearest_view_image(lenses, erect):
         np.testing.assert_array_equal(n[:, 0] // 6, np.arange(lenses[1]))
 
 
+def test_elementary_images_narrower_than_their_lenses_give_a_pixel_of_their_own():
+    """Seen from Λ − K·Λ the outer lenses of a packed picture showed pixels beyond its border: IndexError."""
+    camera = IICamera(
+        pixels=(280, 220), lenses=(56, 44), pixel_pitch_mm=0.1, gap_mm=2.0, lens_pitch_mm=(0.7, 0.7), packed=True
+    )
+    n, m = virtual_camera_pixels(camera)
+    np.testing.assert_array_equal(m[0] // 5, np.arange(56))
+    np.testing.assert_array_equal(n[:, 0] // 5, np.arange(44))
+
+
 def test_depth_is_taken_at_the_very_pixel():
     a = picture()
     n, m = virtual_camera_pixels(a.camera)
