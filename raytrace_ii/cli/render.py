@@ -368,10 +368,11 @@ def _render_set(name: str, folder: Path, views: Views, options: dict[str, Any], 
 
 
 def _cameras(name: str, scale: int) -> Sequence[Any]:
-    """Return the pixel arrays of a camera by name, from a file, or from a folder of maps."""
-    from ii_core import preset_cameras, read_maps
+    """Return the pixel arrays of a camera by name, which comes first, from a file, or from a folder of maps."""
+    from ii_core import camera_names, preset_cameras, read_maps
+    from ii_core.camera.presets import ALIASES
 
-    if not Path(name).is_dir():
+    if name in {*camera_names(), *ALIASES} or not Path(name).is_dir():
         return preset_cameras(name, scale=scale)
     if scale != 1:
         raise ValueError(f"scale is {scale}: stored maps have a fixed size, leave --scale out")

@@ -74,6 +74,14 @@ def test_position_of_the_camera(run, refused, tmp_path):
     refused(run("render", "apples", "--at", "1,2", "-o", tmp_path / "x.png"), "three numbers x,y,z are needed")
 
 
+@pytest.mark.parametrize("name", ["setup2-16", "setup2"])
+def test_a_folder_of_pictures_may_have_the_name_of_a_camera(run, tmp_path, monkeypatch, name):
+    """`--camera setup1 -o setup1/a.png` took the folder for maps of rays once it was there."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).mkdir()
+    assert run("render", "apples", "--camera", name, "--scale", 128, "-o", f"{name}/a.png")[0] == 0
+
+
 def test_invalid_cameras_are_refused(run, refused, tmp_path):
     refused(run("camera", "nope", "-o", tmp_path / "c"), "unknown camera 'nope'")
     refused(run("camera"), "a camera is needed")
