@@ -47,13 +47,14 @@ def _numbered(folder: Path, members: list[Path], grid: Pair | None) -> Views:
     fields = list(zip(*(NUMBER.findall(path.stem) for path in members), strict=True))
     whole = [tuple(map(int, field)) for field in fields if all(text.isdigit() for text in field)]
     varying = [field for field in whole if len(set(field)) > 1]
+    own = os.path.lexists(folder / STRUCTURE)  # of one row of views the row number may be the same in all names
     if grid is not None:
         serial = [field for field in varying if len(set(field)) == len(members)]
         in_order = sorted(zip(serial[0], members, strict=True)) if serial else [(0, path) for path in members]
         return listed([path for _, path in in_order], grid, known=frozenset(("transposed",)))
     pairs = [
         (len(set(a)) * len(set(b)), a, b)
-        for a, b in itertools.combinations(varying, 2)
+        for a, b in itertools.combinations(whole if own else varying, 2)
         if len(set(zip(a, b, strict=True))) == len(members)
     ]
     if not pairs:
