@@ -210,6 +210,8 @@ def test_focus_of_an_array_of_cameras_reaches_near_things(opened, tmp_path, focu
         assert tab.evaluate("f => ii.viewer.depthOf(f)", f) == pytest.approx(z, rel=1e-4)
         near, far = tab.evaluate("ii.viewer.meta.focus")
         assert near <= f <= far
+    told = tab.evaluate("(ii.viewer.set({ f: 0 }), [ii.viewer.shown().f, ii.viewer.shown().r])")
+    assert told == (["z 500.0 mm", "500 mm"] if focus_mm else ["z 4.000 km", "4.000 km"])
 
 
 def test_a_click_before_the_first_painting_finds_its_lens(opened, mapped, tmp_path):

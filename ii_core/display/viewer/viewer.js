@@ -347,7 +347,9 @@ class Viewer {
   // Labels of the values.
   shown() {
     const { state, meta: { camera: c } } = this, degrees = (angle) => `${(angle * 180 / Math.PI).toFixed(1)}°`;
-    const long = (mm, digits) => Math.abs(mm) < 1e4 ? `${mm.toFixed(digits)} mm` : `${(mm / 1000).toPrecision(4)} m`;
+    const long = (mm, digits) => Math.abs(mm) < 1e4 ? `${mm.toFixed(digits)} mm`
+      : Math.abs(mm) < 1e6 ? `${(mm / 1e3).toPrecision(4)} m`
+      : Math.abs(mm) < 1e9 ? `${(mm / 1e6).toPrecision(4)} km` : "∞";
     const late = !this.take.playing && this.take.shown !== state.t;
     return {
       t: late ? "loading" : `${(state.t / this.meta.fps).toFixed(2)} s`,
