@@ -66,5 +66,10 @@ def preview(
     for i in range(TICKS):
         part = i / (TICKS - 1)
         y, value = bottom - 1 - part * (bottom - top - 1), low + part * (high - low)
-        draw.text((canvas.shape[1] - SCALE + 30, y - 8), f"{float(told(value)):.4g}", fill=0, font=font)
+        draw.text((canvas.shape[1] - SCALE + 30, y - 8), four_digits(told(value)), fill=0, font=font)
     return np.asarray(image)
+
+
+def four_digits(value: float) -> str:
+    """Return a number rounded to four digits, without an exponent."""
+    return np.format_float_positional(float(value), precision=4, fractional=False, trim="-")

@@ -108,12 +108,14 @@ def _false_colours(field: IIPicture, disparity: NDArray[Any], *, in_mm: bool) ->
 def _about(values: NDArray[Any], unit: str) -> str:
     import numpy as np
 
+    from ii_core.depth.preview import four_digits
+
     known = values[np.isfinite(values)]
     size = f"{values.shape[1]}×{values.shape[0]} px"
     if not known.size:
         return f"{size}, nothing tells depths apart"
-    low, high = np.quantile(known, [0.01, 0.99])
-    return f"{size}, {low:.4g} … {high:.4g} {unit} (1–99 %)"
+    low, high = map(four_digits, np.quantile(known, [0.01, 0.99]))
+    return f"{size}, {low} … {high} {unit} (1–99 %)"
 
 
 def _as_picture(views: NDArray[Any]) -> NDArray[Any]:

@@ -8,7 +8,7 @@ import pytest
 from ii_core import IIPicture, Rig, depth_of_disparity, disparity_of_depth, preset
 from ii_core.base.colour import linear
 from ii_core.base.files import read_depth, read_image
-from ii_core.depth.preview import preview
+from ii_core.depth.preview import four_digits, preview
 from ii_core.formats.pfm import read_pfm, write_pfm
 from ii_core.picture.component import sub_images
 from tests.ii_core.test_depth import slanted
@@ -158,3 +158,8 @@ def test_errors_of_a_map(run, field, tmp_path):
     assert code == 2 and "--mm needs the camera of --field" in err
     code, _, err = run("measure-depth", tmp_path / "d.pfm", tmp_path / "t.pfm", "--field", path, "--view", "7,1")
     assert code == 2 and "view is '7,1': columns 0–4" in err
+
+
+def test_numbers_of_scales_have_no_exponent():
+    """The scale of a field that reaches far said 2.728e+04 mm."""
+    assert [four_digits(v) for v in (27284.3, 1.5e-4, -3.14159, np.inf)] == ["27280", "0.00015", "-3.142", "inf"]
