@@ -68,8 +68,10 @@ def instance(*kinds: type) -> Rule:
 
 def path(name: str, value: Any) -> None:
     """Rule: text that is not empty, which would be the working folder, or a path object."""
-    if not isinstance(value, str | os.PathLike) or "\0" in os.fspath(value) or value == "":
+    if not isinstance(value, str | os.PathLike):
         raise refuse(name, value, "a path")
+    if value == "" or "\0" in os.fspath(value):
+        raise ValueError(f"{name} is {shown(value)}: a path is needed")
 
 
 def text(name: str, value: Any) -> None:

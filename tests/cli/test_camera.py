@@ -85,6 +85,7 @@ def test_a_folder_of_pictures_may_have_the_name_of_a_camera(run, tmp_path, monke
 def test_invalid_cameras_are_refused(run, refused, tmp_path):
     refused(run("camera", "nope", "-o", tmp_path / "c"), "unknown camera 'nope'")
     refused(run("camera"), "a camera is needed")
+    refused(run("render", "apples", "--camera", "", "-o", tmp_path / "a.png"), "is '': a path is needed")
     refused(run("camera", "setup1", "--scale", 64, "--format", "bmp", "-o", tmp_path / "c"), "unknown format 'bmp'")
     assert not list(tmp_path.iterdir())
     folder = tmp_path / "cam"

@@ -97,7 +97,7 @@ def test_folders_without_a_take_are_refused(tmp_path):
         open_video(tmp_path)
     with pytest.raises(ValueError, match="is no folder of frames"):
         open_video(tmp_path / "none")
-    with pytest.raises(TypeError, match="source is ''"):  # not the working folder
+    with pytest.raises(ValueError, match="source is ''"):  # not the working folder
         open_video("")
     video_of(pictures(3)).save(tmp_path)
     far = tmp_path / f"frame_{10**20}.png"
