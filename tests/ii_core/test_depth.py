@@ -273,12 +273,12 @@ def test_an_array_of_cameras_sees_near_things_wherever_its_views_agree(focus_mm)
 
 
 @pytest.mark.parametrize("viewer_mm", [None, 90.0])
-@pytest.mark.parametrize(("optics", "start_mm", "z"), [("pinhole", 40.0, -15.0), ("grin", 0.0, 20.0)])
+@pytest.mark.parametrize(("optics", "start_mm", "z"), [("pinhole", 40.0, -65.0), ("grin", 0.0, -30.0)])
 def test_depth_begins_where_rays_start(optics, start_mm, z, viewer_mm):
     """A wall before a virtual display plane was placed behind it; panels with meeting zones had no layers at all."""
     camera = IICamera(
         pixels=(48 * 7, 40 * 5), lenses=(48, 40), pixel_pitch_mm=0.1, gap_mm=2.0, optics=(optics,),
-        start_mm=start_mm, viewer_mm=viewer_mm,
+        start_mm=start_mm, viewer_mm=viewer_mm, origin_mm=(3.0, -2.0, -50.0),
     )  # fmt: skip
     light = np.rint(65535 * wall_light(camera, z)).astype(np.uint16)
     picture = IIPicture(light, camera.lenses, camera.ei_pixels, camera, camera.erect)
