@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from scipy import integrate, special
 from scipy.signal import resample
 
 from ii_core import DisplayModel, Eye, IICamera, IIPicture, eye_image, preset
 from ii_core.camera.optics import Lenslet
-from ii_core.waves.spread import FIRST_ZERO, _extent, _kernel, scatter, spread_maps, spread_picture
+from ii_core.waves.spread import FIRST_ZERO, _extent, _kernel, _spot, scatter, spread_maps, spread_picture
 from ii_core.waves.wave import diffraction_limit, lens_spread
 from tests.support.slow import first_fast
 
@@ -106,6 +107,18 @@ def test_a_picture_leaves_as_much_light_in_its_pixels_as_the_transfer():
     light = spread_picture(point(made), maps).pixels[:16, :16, 1]
     assert light[8, 8] == pytest.approx(1 - 0.171, abs=3e-3)
     assert light.sum() == pytest.approx(1, rel=1e-6)
+
+
+@pytest.mark.parametrize(("disk", "aberration"), [(5.0, -3.0), (0.0, 30.0), (40.0, 25.0)])
+def test_spots_of_aberrated_lenses_are_their_integral(disk, aberration):
+    """By 64 + 8·f·d samples of the midpoint rule the error was up to 4e-4, in three times the time."""
+
+    def light(rho, f):
+        return 2 * rho * special.j0(np.pi * f * (disk * rho + aberration * rho**3))
+
+    f = np.array([3.0, 0.0, 0.2, 1.0])
+    wanted = [integrate.quad(light, 0, 1, args=(one,), limit=999)[0] for one in f]
+    np.testing.assert_allclose(_spot(f, disk, aberration), wanted, atol=1e-9)
 
 
 def test_no_ray_leaves_the_extent():
