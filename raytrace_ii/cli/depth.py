@@ -149,5 +149,6 @@ def _two(name: str, text: str, kind: type) -> tuple[Any, Any]:
     try:
         a, b = (kind(part) for part in text.split(","))
     except ValueError:
-        raise ValueError(f"{name} is {text!r}: two numbers as in 4,4 are needed") from None
+        example = "4,4" if kind is int else "-4,2.5"
+        raise ValueError(f"{name} is {text!r}: two numbers as in {example} are needed") from None
     return a, b

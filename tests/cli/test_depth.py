@@ -60,6 +60,7 @@ def test_millimetres_and_all_views(run, field, tmp_path):
         (["-o", "d.jpg"], "no known picture type"),
         (["-o", "d.exr", "--points", "p.obj"], ".ply is needed"),
         (["-o", "d.exr", "--view", "a"], "view is 'a'"),
+        (["-o", "d.exr", "--range", "5"], "two numbers as in -4,2.5 are needed"),
         (["-o", "d.exr", "--range", "2,1"], "low < high"),
     ],
 )
