@@ -24,7 +24,7 @@ from ii_core.depth import estimate
 from ii_core.depth.highlights import highlights
 
 SURE, BORDER, EVERY = 0.9, 8, 5  # of the pixels, every fifth is fitted
-SIGNS = (-1, -1, -1, 1), (-1, -1, 1, -1)  # of the terms of `agreement` and `rivalry`
+SIGNS = (-1, -1, 1), (-1, -1, 1, -1)  # of the terms of `agreement` and `rivalry`
 # seeds, px, views a side
 SETS = ((range(24), 160, (9,)), (range(100, 124), 112, (5, 5, 3, 9)), (range(200, 216), 288, (9,)))
 Array = np.ndarray[Any, Any]
@@ -165,9 +165,9 @@ def terms(picture: IIPicture, true: Array) -> Terms:
     """
     kept: list[Any] = []
 
-    def judged(disparity: Array, ratio: Array, margin: Array, quarters: estimate.Quarters, mean: Array) -> Array:
+    def judged(disparity: Array, ratio: Array, margin: Array, other: Any, noise: float, mean: Array) -> Array:
         known = np.nan_to_num(disparity)
-        both = estimate.agreement(quarters), estimate.rivalry(known, ratio, margin, quarters)
+        both = estimate.agreement(other, noise), estimate.rivalry(known, ratio, margin, other, noise)
         kept.extend(np.stack([np.ones_like(known), *found], axis=-1) for found in both)
         kept.append(np.where(highlights(mean), estimate.SHINY, 1))
         return np.zeros_like(known)

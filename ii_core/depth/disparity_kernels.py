@@ -199,13 +199,15 @@ def _in_order(low, high):
 
 
 @array_kernel
-def add_evidence(views, disparity, limit, smooth, here, push, weight, mean, first, last):
-    """Add up a Gauss–Newton step by quarters of views: d + Σpush/Σweight is a pixel's least-squares disparity.
+def add_evidence(views, disparity, limit, smooth, here, push, reach, slopes, mean, first, last):
+    """Add up what the differences of all views tell about the motion of each pixel.
 
-    A view's weight is 1/(1 + r²/limit²)², r² its squared difference, ``smooth`` (3, H, W) the image of the gradients.
-    Where ``here`` is set, ``push`` and ``weight`` (4, H, W) are filled, and ``mean`` (3, H, W), the weighted mean of
-    all views at the disparity. Diagonals bound the quarters. A row goes through one view after the other: rows of one
-    view stay in the first cache, those of all do not.
+    Between views that are s = (down, across) apart, a pixel moves by M·s; on a surface M is its disparity times the
+    unit matrix. With g the slopes of colours, ``push`` (4, H, W) is Σ w·e·g_i·s_j of the differences e at the
+    disparity, ``reach`` (3, H, W) Σ w·s_j·s_l, and ``slopes`` (3, H, W) Σ_rgb g_i·g_k: the normal equations of M.
+    A view's weight w is 1/(1 + r²/limit²)², r² its squared difference, ``smooth`` (3, H, W) the image of the slopes.
+    Where ``here`` is set, they are filled, and ``mean`` (3, H, W), the weighted mean of all views at the disparity. A
+    row goes through one view after the other: rows of one view stay in the first cache, those of all do not.
     """
     height, width = disparity.shape
     own, pixels = views.pixels[0], views.pixels.reshape(-1)
@@ -216,7 +218,7 @@ def add_evidence(views, disparity, limit, smooth, here, push, weight, mean, firs
     for y in range(first, last):
         for x in range(width):
             if here[y, x]:
-                push[:, y, x], weight[:, y, x] = 0.0, 0.0
+                push[:, y, x], reach[:, y, x], slopes[:, y, x] = 0.0, 0.0, 0.0
                 for c in range(3):
                     mean[c, y, x] = own[c, y, x]
         if y < 1 or y > height - 2:
@@ -229,15 +231,15 @@ def add_evidence(views, disparity, limit, smooth, here, push, weight, mean, firs
         moved[:], mass[:] = 0.0, 1.0
         for n in range(1, views.steps.shape[0]):
             a, b = views.steps[n, 0], views.steps[n, 1]
-            q = (2 if a + b > 0.0 or (a + b == 0.0 and a > 0.0) else 0) + (
-                1 if a - b > 0.0 or (a - b == 0.0 and a > 0.0) else 0
-            )
             _differences(pixels, n, height, a, b, y, disparity[y], here[y], colours, *parts)
-            _weigh(limit, a, b, down, across, *parts, push[q, y], weight[q, y], moved, mass)
+            _weigh(limit, a, b, down, across, *parts, push[:, y], reach[:, y], moved, mass)
         for x in range(1, width - 1):
             if here[y, x]:
                 for c in range(3):
                     mean[c, y, x] += moved[c, x] / mass[x]
+                    slopes[0, y, x] += down[c, x] * down[c, x]
+                    slopes[1, y, x] += down[c, x] * across[c, x]
+                    slopes[2, y, x] += across[c, x] * across[c, x]
 
 
 @stage_kernel
@@ -264,25 +266,39 @@ def _differences(pixels, n, height, a, b, y, disparity, here, colours, off, seen
 
 
 @stage_kernel
-def _weigh(limit, a, b, down, across, off, seen, push, weight, moved, mass):
+def _weigh(limit, a, b, down, across, off, seen, push, reach, moved, mass):
     """Add the evidence of a view to a row; every loop writes one array, and becomes vector instructions."""
     e0, e1, e2, scale = off[0], off[1], off[2], _ONE / (limit * limit)
-    d0, d1, d2, a0, a1, a2 = down[0], down[1], down[2], across[0], across[1], across[2]
     for x in range(seen.size):
         odds = _ONE + (e0[x] * e0[x] + e1[x] * e1[x] + e2[x] * e2[x]) * scale
         seen[x] = seen[x] / (odds * odds)
-    for x in range(seen.size):
-        slopes = e0[x] * (a * d0[x] + b * a0[x]) + e1[x] * (a * d1[x] + b * a1[x]) + e2[x] * (a * d2[x] + b * a2[x])
-        push[x] += seen[x] * slopes
-    for x in range(seen.size):
-        s0, s1, s2 = a * d0[x] + b * a0[x], a * d1[x] + b * a1[x], a * d2[x] + b * a2[x]
-        weight[x] += seen[x] * (s0 * s0 + s1 * s1 + s2 * s2)
+    _add_slopes(a, down, off, seen, push[0])
+    _add_slopes(b, down, off, seen, push[1])
+    _add_slopes(a, across, off, seen, push[2])
+    _add_slopes(b, across, off, seen, push[3])
+    _add_times(a * a, seen, reach[0])
+    _add_times(a * b, seen, reach[1])
+    _add_times(b * b, seen, reach[2])
     for c in range(3):
         e, m = off[c], moved[c]
         for x in range(seen.size):
             m[x] += seen[x] * e[x]
+    _add_times(_ONE, seen, mass)
+
+
+@stage_kernel
+def _add_slopes(step, slopes, off, seen, total):
+    """total += step · w · Σ_rgb e·g."""
+    e0, e1, e2, g0, g1, g2 = off[0], off[1], off[2], slopes[0], slopes[1], slopes[2]
     for x in range(seen.size):
-        mass[x] += seen[x]
+        total[x] += step * seen[x] * (e0[x] * g0[x] + e1[x] * g1[x] + e2[x] * g2[x])
+
+
+@stage_kernel
+def _add_times(factor, seen, total):
+    """total += factor · w."""
+    for x in range(seen.size):
+        total[x] += factor * seen[x]
 
 
 @lean_kernel

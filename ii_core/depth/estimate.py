@@ -47,19 +47,19 @@ BEHIND, FRINGE = 0.25, np.float32(0.05)
 # *Apples* bad (2026-11-26). Median of lower rank at jumps of more than JUMP px: such pixels match the surface in
 # front. On `cuboid`, 16.7 to 16.0 % above 0.07 px (2026-11-25).
 SETTLED, JUMP, LOWER = 1e5, 0.3, 3
-# Steps end where quarters of the views disagree by more than AT_ODDS px and BY_NOISE times what noise explains: by a
-# moving reflection, a hidden edge, or rendering noise that all views share. On antinous of the HCI fields 15.4 % are
-# above 0.07 px with this rule, more than 20 % without (2026-11-25).
-AT_ODDS, BY_NOISE, SUDDEN = 0.003, 4.0, 8
+# Steps end where `other_motion` is above AT_ODDS px and BY_NOISE times the error by noise: at a moving reflection, a
+# hidden edge, or rendering noise that all views share. On antinous of the HCI fields 15.3 % are above 0.07 px with
+# this rule, 23.8 % without (2026-11-30). RIDGE keeps motion that no slope tells at zero.
+AT_ODDS, BY_NOISE, SUDDEN, RIDGE = 0.012, 20.0, 8, 1e-3
 # Confidence: labels APART px away are rivals; labels of 9×9, 5×5 and 3×3 views are 0.12, 0.24 and 0.48 px apart, so
 # that 0.48 px counts in each. A pixel is right if the views agree and no rival does as well, the product of two
 # logistic terms: `JUDGES`. Few sure pixels among unsure ones are chance: a third term, `CROWD`, has their mean over
 # AROUND px. Fitted by `python -m benchmarks run depth_confidence` to 64 fields in closed form (spheres, walls, bars,
 # shadows, highlights), whose signs are kept, and to no other field. Means over 31 px do as well there; over 63 px, 42
 # instead of 34 % of `cuboid` are sure (2026-11-27).
-APART, AROUND = 0.45, 63
-JUDGES = (7.5, -0.62, -1.01, -0.65, 1.18), (-4.68, -0.55, -2.36, 0.69, -0.29)
-CROWD = -2.17, 0.63, 4.11
+APART, AROUND, SMALL = 0.45, 63, 0.03  # SMALL: motion besides disparity that counts little, px
+JUDGES = (-0.1, -0.66, -2.58, 0.92), (-4.88, -0.51, -2.55, 0.82, -0.31)
+CROWD = -2.07, 0.67, 3.89
 SHINY = 0.5  # times the confidence where `highlights` are found: they move like surfaces behind the true one
 LOUD = 2 * OCCLUDED  # noise in codes from which no pixel is sure: all views then count as occluded
 # Even blocks from which noise is estimated: side in px, and their share.
@@ -114,7 +114,7 @@ def estimate_depth(
     1. Every label, a disparity, costs the mean difference along half-lines of views, the better half of eight.
     2. Costs are passed on along rows and columns; the least one wins, a parabola places it between labels.
     3. Gauss–Newton steps over all views, with gradients of their mean; planes in bilateral windows average them.
-       Where quarters of the views disagree, the matched disparity stays.
+       Where colours move as no disparity moves them, the matched disparity stays.
 
     Parameters
     ----------
@@ -168,11 +168,11 @@ def estimate_depth(
         disparity, sure = refined(views, disparity, noise, evidence, here, workers)
         if step > 0:
             here &= sure <= SETTLED * CODES**2
-    quarters = at_odds(evidence, noise)
+    other = other_motion(evidence)
     disparity = thinned(disparity)
     told(3 + STEPS, total, "confidence")
     disparity[np.isnan(start) | blocked(picture, at)] = np.nan
-    confidence = judged(disparity, ratio, margin, quarters, evidence.mean) / (1 + (noise / LOUD) ** SUDDEN)
+    confidence = judged(disparity, ratio, margin, other, noise, evidence.mean) / (1 + (noise / LOUD) ** SUDDEN)
     depth = None if picture.camera is None else depth_of_disparity(picture.camera, disparity)
     told(total, total, "")
     return DepthEstimate(disparity, confidence, depth, at)
@@ -326,27 +326,31 @@ def matched(views: Views, labels: Map, workers: int | None) -> tuple[Map, Map, M
     return np.asarray(ndimage.median_filter(labelled(total, labels), 3)), ratio, margin / CODES
 
 
-def judged(disparity: Map, ratio: Map, margin: Map, quarters: Quarters, mean: Map) -> Map:
+def judged(disparity: Map, ratio: Map, margin: Map, other: OtherMotion, noise: float, mean: Map) -> Map:
     """Return the estimated probability that disparities are within 0.07 px."""
     known = np.nan_to_num(disparity)
-    terms = agreement(quarters), rivalry(known, ratio, margin, quarters)
+    terms = agreement(other, noise), rivalry(known, ratio, margin, other, noise)
     both = _logistic(JUDGES[0], terms[0]) * _logistic(JUDGES[1], terms[1])
     right = _logistic(CROWD, crowd(both)) * np.where(highlights(mean), SHINY, 1)
     return np.where(np.isnan(disparity), 0, right).astype(np.float32)
 
 
-def agreement(quarters: Quarters) -> tuple[Map, ...]:
-    """Return what tells whether views agree, in a window of planes and around, and what noise leaves of that."""
-    odds, halves, log_error = quarters
-    most = ndimage.maximum_filter(odds, 2 * RADIUS + 1)
-    return np.log(odds + 0.1), np.log(most + 0.1), np.log(halves + 0.003), log_error
+def agreement(other: OtherMotion, noise: float) -> tuple[Map, ...]:
+    """Return what tells whether views agree: motion besides disparity, here and around, and the error by noise."""
+    most = ndimage.maximum_filter(other.px, 2 * RADIUS + 1)
+    return np.log(at_odds(other, noise) + 0.1), np.log(most + SMALL), log_error(other, noise)
 
 
-def rivalry(disparity: Map, ratio: Map, margin: Map, quarters: Quarters) -> tuple[Map, ...]:
+def log_error(other: OtherMotion, noise: float) -> Map:
+    """Return the logarithm of the error that noise leaves, px."""
+    return np.log((noise + ROUNDING) * CODES * other.error)
+
+
+def rivalry(disparity: Map, ratio: Map, margin: Map, other: OtherMotion, noise: float) -> tuple[Map, ...]:
     """Return what tells whether another disparity does as well: spread of disparities, `rivals`, error by noise."""
     spread = ndimage.maximum_filter(disparity, 7) - ndimage.minimum_filter(disparity, 7)
     rivals = np.log(np.clip(ratio, 0.05, 2)), np.log(np.maximum(margin, 0) + 2)
-    return np.log(spread + 0.02), *rivals, quarters.log_error
+    return np.log(spread + 0.02), *rivals, log_error(other, noise)
 
 
 def crowd(right: Map) -> tuple[Map, ...]:
@@ -361,17 +365,18 @@ def _logistic(weights: tuple[float, ...], terms: tuple[Map, ...]) -> Map:
 
 
 class Evidence(NamedTuple):
-    """Sums of Gauss–Newton steps by quarters of the views, and what all views see."""
+    """What all views tell about the motion of each pixel: `add_evidence`."""
 
     push: Map  # (4, H, W)
-    weight: Map  # (4, H, W)
+    reach: Map  # (3, H, W)
+    slopes: Map  # (3, H, W)
     mean: Map  # (3, H, W), 16-bit codes
 
 
 def nothing_seen(views: Views) -> Evidence:
     """Return the evidence before the first step: the mean is the reference."""
-    none = np.zeros((4, *views.pixels.shape[2:]), np.float32)
-    return Evidence(none, none.copy(), views.pixels[0].astype(np.float32))
+    push, reach, slopes = (np.zeros((n, *views.pixels.shape[2:]), np.float32) for n in (4, 3, 3))
+    return Evidence(push, reach, slopes, views.pixels[0].astype(np.float32))
 
 
 def refined(
@@ -385,15 +390,16 @@ def refined(
     height = here.shape[0]
     known, seen = np.nan_to_num(disparity), evidence.mean.copy()
     around = ndimage.maximum_filter(here, 2 * RADIUS + 1)
-    limit, (push, weight, mean) = np.float32(OCCLUDED * CODES), evidence
-    run(workers, height, kernels.add_evidence, views, known, limit, mean, around, push, weight, seen)
+    limit, (push, reach, slopes, mean) = np.float32(OCCLUDED * CODES), evidence
+    run(workers, height, kernels.add_evidence, views, known, limit, mean, around, push, reach, slopes, seen)
     mean[:] = seen
-    odds = at_odds(evidence, noise).odds
+    odds = at_odds(other_motion(evidence), noise)
     out, sure = known.copy(), np.zeros_like(known)
     view = views.pixels[0].astype(np.float32)
     likeness = np.float32(SAME_COLOUR * CODES), np.float32(SAME_SURFACE)
     counted = np.where(ndimage.maximum_filter(known, 3) - known > BEHIND, FRINGE, np.float32(1))
-    sums = known, push.sum(axis=0) * counted, weight.sum(axis=0) * counted, view
+    weight = slopes[0] * reach[0] + 2 * slopes[1] * reach[1] + slopes[2] * reach[2]
+    sums = known, (push[0] + push[3]) * counted, weight * counted, view
     run(workers, height, kernels.fit_planes, *sums, RADIUS, *likeness, PRIOR * CODES**2, FLAT, here, out, sure)
     out = known + np.clip(out - known, -LONGEST, LONGEST) / (1 + np.minimum(odds, 100) ** SUDDEN)
     return np.where(here, ndimage.median_filter(out, 3), known), sure
@@ -405,36 +411,44 @@ def thinned(disparity: Map) -> Map:
     return np.where(jump, ndimage.rank_filter(disparity, LOWER, 3), disparity)
 
 
-class Quarters(NamedTuple):
-    """How quarters of the views agree, in windows of planes.
+class OtherMotion(NamedTuple):
+    """Motion of windows of planes besides that of their disparity, px a step, and px of error by a code of noise."""
 
-    By how much they disagree over what is allowed, the most that two disjoint halves of the views differ, px, and the
-    logarithm of the error that noise leaves, px.
+    px: Map
+    error: Map
+
+
+def other_motion(evidence: Evidence) -> OtherMotion:
+    """Return the motion that no disparity explains: of highlights, reflections, hidden edges, noise.
+
+    The normal equations of M, four numbers, are solved by elimination. What M explains of the squared differences in
+    a window beyond what a disparity does is told as the px of disparity that would explain as much.
     """
+    side, (push, reach, slopes, _) = 2 * RADIUS + 1, evidence
 
-    odds: Map
-    halves: Map
-    log_error: Map
+    def summed(part: Map) -> Map:
+        return np.asarray(ndimage.uniform_filter(part, side) * np.float32(side**2))
+
+    right = [summed(part) for part in push]
+    pairs = {at: summed(slopes[at[0]] * reach[at[1]]) for at in product(range(3), repeat=2)}
+    weight = np.maximum(pairs[0, 0] + 2 * pairs[1, 1] + pairs[2, 2], 1)
+    left = {(m, n): pairs[m // 2 + n // 2, m % 2 + n % 2].copy() for m in range(4) for n in range(m + 1)}
+    for k in range(4):
+        left[k, k] += RIDGE * weight
+    explained = -np.square(right[0] + right[3]) / (weight * (1 + 2 * RIDGE))
+    for k in range(4):
+        explained += np.square(right[k]) / left[k, k]
+        for m in range(k + 1, 4):
+            factor = left[m, k] / left[k, k]
+            right[m] -= factor * right[k]
+            for n in range(k + 1, m + 1):
+                left[m, n] -= factor * left[n, k]
+    return OtherMotion(np.sqrt(np.maximum(explained, 0) / weight), np.sqrt(3 / weight))
 
 
-def at_odds(evidence: Evidence, noise: float) -> Quarters:
-    """Return how quarters of the views agree where noise has so many codes."""
-    side, (push, weight, _) = 2 * RADIUS + 1, evidence
-    pushes, weights = (ndimage.uniform_filter(part, (0, side, side)) * side**2 for part in (push, weight))
-    heavy = np.maximum(weights, 1)
-    mass = heavy.sum(axis=0)
-    away = pushes / heavy - pushes.sum(axis=0) / mass
-    quarters = max(int((weight.sum(axis=(1, 2)) > 0).sum()) - 1, 1)
-    spread = np.sqrt((heavy * away**2).sum(axis=0) / mass / quarters)
-    odds = np.asarray(spread / (AT_ODDS + BY_NOISE * np.sqrt(3 / mass) * noise * CODES))
-    halves = np.zeros_like(odds)
-    for other in (1, 2, 3):
-        one = [q in (0, other) for q in range(4)]
-        steps = [
-            pushes[half].sum(axis=0) / np.maximum(weights[half].sum(axis=0), 1) for half in (one, np.invert(one))
-        ]
-        np.maximum(halves, np.abs(steps[0] - steps[1]), out=halves)
-    return Quarters(odds, halves, np.log((noise + ROUNDING) * CODES * np.sqrt(3 / mass)))
+def at_odds(other: OtherMotion, noise: float) -> Map:
+    """Return the motion besides disparity over what is allowed where noise has so many codes."""
+    return other.px / (AT_ODDS + BY_NOISE * other.error * noise * CODES)
 
 
 def noise_codes(views: Views) -> float:
