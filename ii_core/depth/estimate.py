@@ -48,9 +48,9 @@ BEHIND, FRINGE = 0.25, np.float32(0.05)
 # front. On `cuboid`, 16.7 to 16.0 % above 0.07 px (2026-11-25).
 SETTLED, JUMP, LOWER = 1e5, 0.3, 3
 # Steps end where `other_motion` is above AT_ODDS px and BY_NOISE times the error by noise: at a moving reflection, a
-# hidden edge, or rendering noise that all views share. On antinous of the HCI fields 15.3 % are above 0.07 px with
+# hidden edge, or rendering noise that all views share. On antinous of the HCI fields 15.0 % are above 0.07 px with
 # this rule, 23.8 % without (2026-11-30). RIDGE keeps motion that no slope tells at zero.
-AT_ODDS, BY_NOISE, SUDDEN, RIDGE = 0.012, 20.0, 8, 1e-3
+AT_ODDS, BY_NOISE, SUDDEN, RIDGE = 0.02, 15.0, 8, 1e-3
 # Confidence: labels APART px away are rivals; labels of 9×9, 5×5 and 3×3 views are 0.12, 0.24 and 0.48 px apart, so
 # that 0.48 px counts in each. A pixel is right if the views agree and no rival does as well, the product of two
 # logistic terms: `JUDGES`. Few sure pixels among unsure ones are chance: a third term, `CROWD`, has their mean over
@@ -58,7 +58,7 @@ AT_ODDS, BY_NOISE, SUDDEN, RIDGE = 0.012, 20.0, 8, 1e-3
 # shadows, highlights), whose signs are kept, and to no other field. Means over 31 px do as well there; over 63 px, 42
 # instead of 34 % of `cuboid` are sure (2026-11-27).
 APART, AROUND, SMALL = 0.45, 63, 0.03  # SMALL: motion besides disparity that counts little, px
-JUDGES = (-0.1, -0.66, -2.58, 0.92), (-4.88, -0.51, -2.55, 0.82, -0.31)
+JUDGES = (0.06, -0.78, -2.54, 0.97), (-4.89, -0.51, -2.56, 0.82, -0.32)
 CROWD = -2.07, 0.67, 3.89
 SHINY = 0.5  # times the confidence where `highlights` are found: they move like surfaces behind the true one
 LOUD = 2 * OCCLUDED  # noise in codes from which no pixel is sure: all views then count as occluded
