@@ -412,17 +412,17 @@ def thinned(disparity: Map) -> Map:
 
 
 class OtherMotion(NamedTuple):
-    """Motion of windows of planes besides that of their disparity, px a step, and px of error by a code of noise."""
+    """Motion besides that of the disparity, and the error of disparity by noise, in windows of planes."""
 
-    px: Map
-    error: Map
+    px: Map  # (H, W), px of disparity that would move colours as much
+    error: Map  # (H, W), px a 16-bit code
 
 
 def other_motion(evidence: Evidence) -> OtherMotion:
     """Return the motion that no disparity explains: of highlights, reflections, hidden edges, noise.
 
-    The normal equations of M, four numbers, are solved by elimination. What M explains of the squared differences in
-    a window beyond what a disparity does is told as the px of disparity that would explain as much.
+    The normal equations of `add_evidence` for M, four numbers, are solved by elimination. What M explains of the
+    squared differences in a window beyond what a disparity does is told as px of disparity.
     """
     side, (push, reach, slopes, _) = 2 * RADIUS + 1, evidence
 
